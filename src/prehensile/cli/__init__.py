@@ -1,0 +1,1 @@
+"""The ``prehensile`` command. See :mod:`prehensile.cli.main`."""

@@ -1,0 +1,72 @@
+"""Entry point of the ``prehensile`` command.
+
+Every subcommand is a module of this package with two functions, ``add_arguments(parser)`` and
+``run(args) -> int``. Only the module of the command that was asked for is imported, so that
+``prehensile --help`` answers at once (it imports no Drake).
+"""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+import prehensile
+from prehensile.errors import InputError
+
+# name: (module in prehensile.cli, one line of help)
+COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("demo", "run a demonstration: clear-bin, pick-place"),
+    "run": ("run", "simulate a scenario and watch it in the browser"),
+    "view": ("view", "look at a model or a scenario, with joint sliders"),
+    "teleop": ("teleop", "drive a station's arm and hand from the browser"),
+    "models": ("models", "list the models, or show one"),
+    "diagram": ("diagram", "draw the system diagram of a station"),
+    "bench": ("bench", "run the benchmarks beside their peers"),
+    "doctor": ("doctor", "say what is missing on this machine, in words"),
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="prehensile", description="Robotic manipulation: from depth images to joint torques."
+    )
+    parser.add_argument("--version", action="version", version=prehensile.__version__)
+    parser.add_argument(
+        "--debug", action="store_true", help="show the traceback of an error instead of its text"
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, (_, text) in COMMANDS.items():
+        # The real arguments are added once the command is known; -h must reach them too.
+        commands.add_parser(name, help=text, add_help=False)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command.
+
+    Args:
+        argv: the arguments after the program's name; default ``sys.argv[1:]``.
+
+    Returns:
+        The exit status: 0 done, 1 done but without success, 2 bad input, 130 interrupted.
+    """
+    args, rest = _parser().parse_known_args(argv)
+    module_name, text = COMMANDS[args.command]
+    module = importlib.import_module(f"prehensile.cli.{module_name}")
+    parser = argparse.ArgumentParser(prog=f"prehensile {args.command}", description=text)
+    parser.add_argument("--debug", action="store_true", default=args.debug, help=argparse.SUPPRESS)
+    module.add_arguments(parser)
+    command_args = parser.parse_args(rest)
+    try:
+        return module.run(command_args)
+    except InputError as error:
+        if command_args.debug:
+            raise
+        for finding in error.findings:
+            print(f"prehensile: {finding}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        if command_args.debug:
+            raise
+        print("prehensile: interrupted", file=sys.stderr)
+        return 130

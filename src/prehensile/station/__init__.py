@@ -1,0 +1,1 @@
+"""Scenarios, and the stations that are built from them."""
