@@ -1,0 +1,1 @@
+"""State machines that decide, and the players that move, as Drake Systems."""

@@ -1,0 +1,1 @@
+"""Random scenes: clutter in a bin."""

@@ -1,0 +1,1 @@
+"""Complete behaviours, one module each."""
