@@ -1,13 +1,10 @@
 """What a clutter-clearing run reports: attempts, outcomes, times."""
 
 import dataclasses as dc
-import json
 import math
-import os
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -133,13 +130,6 @@ class ClearBinReport:
                 },
             }
         )
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Writes JSON to a temporary name beside `path` and renames it, so it is whole or absent."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")
-    os.replace(temporary, path)
 
 
 def _plain(value: Any) -> Any:
