@@ -1,0 +1,71 @@
+"""``prehensile demo``: complete behaviours to watch, each with a report and a replay to keep."""
+
+import argparse
+from pathlib import Path
+
+from prehensile.errors import Finding, InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds a subcommand for each demonstration."""
+    demos = parser.add_subparsers(dest="demo", metavar="DEMO", required=True)
+    clear_bin = demos.add_parser(
+        "clear-bin", help="an arm clears a bin of objects it has never met into a second one"
+    )
+    clear_bin.add_argument("--objects", type=int, default=10, help="how many (default 10)")
+    _add_common(clear_bin)
+    clear_bin.set_defaults(start=_clear_bin)
+    pick_place = demos.add_parser("pick-place", help="an arm moves a brick whose pose is known")
+    _add_common(pick_place)
+    pick_place.set_defaults(start=_pick_place)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the demonstration that was chosen."""
+    return args.start(args)
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="of every random choice (default 0)")
+    parser.add_argument(
+        "--out", type=Path, help="folder of report and replay (default prehensile-out/DEMO)"
+    )
+    parser.add_argument("--no-browser", action="store_true", help="do not open the browser")
+    # Accepted after the demo's name too, as after any other command.
+    parser.add_argument(
+        "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+    )
+
+
+def _clear_bin(args: argparse.Namespace) -> int:
+    if not 1 <= args.objects <= 40:
+        raise InputError(Finding("must be between 1 and 40", key="--objects"))
+    _check_seed(args.seed)
+    from prehensile.tasks.clear_bin_demo import run_demo
+
+    report = run_demo(
+        objects=args.objects,
+        seed=args.seed,
+        browser=not args.no_browser,
+        out=args.out or Path("prehensile-out/clear-bin"),
+    )
+    if report.interrupted:
+        return 130
+    return 0 if report.cleared else 1
+
+
+def _pick_place(args: argparse.Namespace) -> int:
+    _check_seed(args.seed)
+    from prehensile.tasks.pick_place import run_demo
+
+    report = run_demo(
+        seed=args.seed,
+        browser=not args.no_browser,
+        out=args.out or Path("prehensile-out/pick-place"),
+    )
+    return 0 if report.success else 1
+
+
+def _check_seed(seed: int) -> None:
+    if seed < 0:
+        raise InputError(Finding("must not be negative", key="--seed"))
