@@ -22,9 +22,9 @@ A file for Drake (VTK cameras, Meshcat, `Meshcat.StaticHtml`) is a list of parts
     write_gltf(folder / "link.gltf", [Part(housing, steel)])
 
 and in the SDF `<mesh><uri>link.gltf</uri></mesh>` shows it with x, y, z as in the mesh: the
-writer already turns for glTF's y-up convention. The camera engine shades it with the material's
-metallic and roughness only where lights or an environment map give it something to reflect, so
-keep metals lighter than in life. Arguments out of range raise InputError.
+writer already turns for glTF's y-up convention. Without an environment map, which the camera
+engine has no need of, a metallic surface has nothing to reflect and looks black: keep `metallic`
+at 0.3 or below and make the colour as light as the metal. Arguments out of range raise InputError.
 """
 
 from prehensile.models.shapes.gltf import Material, Part, read_gltf, write_atomically, write_gltf

@@ -1,0 +1,1 @@
+"""Tables, bins, shelves and cupboards."""

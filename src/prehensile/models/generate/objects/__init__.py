@@ -1,0 +1,1 @@
+"""Household objects with the dimensions and masses of the YCB set."""
