@@ -1,0 +1,66 @@
+"""What tables, bins and cupboards are put together from: boxes that are seen and that touch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from prehensile.models.generate import solids
+from prehensile.models.generate.sdf_model import (
+    IDENTITY,
+    Collision,
+    Contact,
+    Inertial,
+    Link,
+    Pose,
+    Shape,
+    Visual,
+)
+
+Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Block:
+    """An axis-aligned box between two corners (m, in the frame of the link)."""
+
+    name: str
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+    @property
+    def shape(self) -> Shape:
+        """The box."""
+        size = (round(h - l, 9) for l, h in zip(self.low, self.high, strict=True))
+        return Shape("box", tuple(size))
+
+    @property
+    def pose(self) -> Pose:
+        """Of its centre."""
+        x, y, z = (round(0.5 * (h + l), 9) for l, h in zip(self.low, self.high, strict=True))
+        return (x, y, z, 0.0, 0.0, 0.0)
+
+
+def inertial(mass: float, blocks: Sequence[Block]) -> Inertial:
+    """Mass properties of blocks of one material."""
+    return solids.body(mass, [(b.shape, b.pose) for b in blocks])
+
+
+def collisions(blocks: Sequence[Block], contact: Contact) -> tuple[Collision, ...]:
+    """The blocks as collision shapes."""
+    return tuple(Collision(b.name, b.shape, b.pose, contact) for b in blocks)
+
+
+def plain_visuals(blocks: Sequence[Block], rgba: Rgba) -> tuple[Visual, ...]:
+    """The blocks as they are."""
+    return tuple(Visual(b.name, b.shape, b.pose, rgba) for b in blocks)
+
+
+def link(
+    name: str,
+    mass: float,
+    blocks: Sequence[Block],
+    contact: Contact,
+    visuals: tuple[Visual, ...],
+    pose: Pose = IDENTITY,
+) -> Link:
+    """A link made of blocks of one material."""
+    return Link(name, pose, inertial(mass, blocks), visuals, collisions(blocks, contact))
