@@ -1,0 +1,94 @@
+"""Splitting a cloud into objects without knowing them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from prehensile.perception.cloud import Cloud
+
+
+def convex_segments(
+    cloud: Cloud,
+    voxel_size: float,
+    *,
+    max_concavity: float = np.deg2rad(15.0),
+    min_points: int = 12,
+) -> NDArray[np.int64]:
+    """Labels pieces of the cloud that are connected without a concave edge.
+
+    Household objects are mostly convex and meet their neighbours in concave edges, so points in
+    adjacent voxels belong together if the surface between them is flat or convex (Stein,
+    Schoeler, Papon and Woergoetter, "Object Partitioning using Local Convexity", CVPR 2014).
+
+    Args:
+        cloud: one point per voxel, as :func:`prehensile.perception.fuse_depth_images` gives.
+        voxel_size: edge of those voxels [m].
+        max_concavity: two adjacent points are joined if their normals turn toward each other by
+            less than this [rad].
+        min_points: smaller pieces are labelled -1.
+
+    Returns:
+        (N,) labels 0, 1, ... by decreasing number of points; -1 for points of no piece.
+    """
+    n = len(cloud)
+    if n == 0:
+        return np.zeros(0, dtype=np.int64)
+    i, j = _adjacent_pairs(cloud.points, voxel_size)
+    d = cloud.points[j] - cloud.points[i]
+    d /= np.linalg.norm(d, axis=1, keepdims=True) + 1e-12
+    n_i, n_j = cloud.normals[i], cloud.normals[j]
+    # Convex: going from i to j the normal leans forward, so (n_j - n_i) . d >= 0.
+    bend = np.sum((n_j - n_i) * d, axis=1)
+    apart = np.linalg.norm(n_j - n_i, axis=1)
+    same = (bend > -2.0 * np.sin(0.5 * max_concavity)) & (apart < 1.9)
+    labels = _components(n, i[same], j[same])
+    _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(-count, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    rank[count < min_points] = -1
+    return rank[inverse]
+
+
+def _adjacent_pairs(
+    points: NDArray[np.float64], voxel_size: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of points in voxels that share a face, an edge or a corner, each pair once."""
+    cell = np.floor(points / voxel_size).astype(np.int64)
+    cell -= cell.min(axis=0) - 1
+    extent = cell.max(axis=0) + 2
+    key = (cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]
+    order = np.argsort(key, kind="stable")
+    sorted_key = key[order]
+    first, second = [], []
+    for dx, dy, dz in np.ndindex(3, 3, 3):
+        shift = ((dx - 1) * extent[1] + (dy - 1)) * extent[2] + (dz - 1)
+        if shift <= 0:
+            continue
+        at = np.minimum(np.searchsorted(sorted_key, key + shift), len(points) - 1)
+        hit = np.nonzero(sorted_key[at] == key + shift)[0]
+        first.append(hit)
+        second.append(order[at[hit]])
+    return np.concatenate(first), np.concatenate(second)
+
+
+def _components(n: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Connected components of the graph of n nodes with edges (i, j): the least node of each.
+
+    Every node hangs on a smaller one; each round hooks the roots of an edge's ends together and
+    then shortens all chains (Shiloach and Vishkin, 1982).
+    """
+    parent = np.arange(n)
+    while True:
+        root_i, root_j = parent[i], parent[j]
+        differ = root_i != root_j
+        if not differ.any():
+            return parent
+        i, j = i[differ], j[differ]
+        low = np.minimum(root_i[differ], root_j[differ])
+        high = np.maximum(root_i[differ], root_j[differ])
+        np.minimum.at(parent, high, low)
+        while True:
+            grand = parent[parent]
+            if np.array_equal(grand, parent):
+                break
+            parent = grand
