@@ -1,0 +1,1 @@
+"""Frames, Jacobians and paths of poses."""

@@ -1,0 +1,292 @@
+"""What a planner knows of an arm: kinematics, joint limits, and what may collide with what."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common import Parallelism
+from pydrake.geometry import Shape
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, JacobianWrtVariable
+from pydrake.planning import (
+    LinearDistanceAndInterpolationProvider,
+    RobotDiagramBuilder,
+    SceneGraphCollisionChecker,
+)
+
+from prehensile.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of n joints; each array is (n,).
+
+    Attributes:
+        lower, upper: positions (rad or m).
+        velocity: largest absolute velocity.
+        acceleration: largest absolute acceleration.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+    def contain(self, q: FloatArray, tolerance: float = 0.0) -> bool:
+        """Whether all positions of q, (n,) or (K, n), lie within the limits."""
+        return bool(np.all(q >= self.lower - tolerance) and np.all(q <= self.upper + tolerance))
+
+    def scaled(self, velocity: float, acceleration: float) -> "JointLimits":
+        """The same limits with velocity and acceleration times the given factors."""
+        return JointLimits(
+            self.lower, self.upper, self.velocity * velocity, self.acceleration * acceleration
+        )
+
+
+class ArmModel:
+    """An arm with a hand among the fixed things around it, for planning.
+
+    Free objects are not part of it: what a camera sees is added with :meth:`set_obstacles`, and
+    a grasped object with :meth:`attach`. Configurations q are those of the arm's joints alone,
+    (n,); the hand stands at the width of :meth:`set_hand_width`.
+
+    Distances along joint paths are weighted by each joint's lever arm, so that they are in
+    metres and bound the motion of any point of the arm from above up to a factor sqrt(n).
+
+    Attributes:
+        plant: the finalized plant of arm, hand and surroundings.
+        limits: the joint limits of the arm.
+        checker: Drake's collision checker over the same diagram.
+    """
+
+    def __init__(
+        self,
+        populate: Callable[[MultibodyPlant], object],
+        *,
+        arm: str = "iiwa",
+        hand: str = "wsg",
+        gripper_frame: str = "body",
+        padding: float = 0.005,
+        edge_step: float = 0.015,
+        acceleration: Sequence[float] | None = None,
+    ) -> None:
+        """Builds the model.
+
+        Args:
+            populate: adds arm, hand, table, bins ... to an empty plant.
+            arm: name of the arm's model instance.
+            hand: name of the hand's model instance.
+            gripper_frame: the frame G of the hand that plans are made for: y points from the
+                palm to the finger tips, x is the closing direction.
+            padding: clearance kept between the robot and its surroundings (m).
+            edge_step: weighted distance between two checked configurations of an edge (m).
+            acceleration: acceleration limits of the arm (n,). Without it the model file's are
+                used, and where it has none, five times the velocity limit per second.
+
+        Raises:
+            InputError: if arm, hand or frame do not exist or the arm has no joints.
+        """
+        builder = RobotDiagramBuilder(time_step=0.0)
+        populate(builder.plant())
+        plant = builder.plant()
+        if not plant.is_finalized():
+            plant.Finalize()
+        for name in (arm, hand):
+            if not plant.HasModelInstanceNamed(name):
+                raise InputError(f"the plant has no model named {name!r}")
+        arm_instance = plant.GetModelInstanceByName(arm)
+        hand_instance = plant.GetModelInstanceByName(hand)
+        if plant.num_positions(arm_instance) == 0:
+            raise InputError(f"model {arm!r} has no joints to plan for")
+        if not plant.HasFrameNamed(gripper_frame, hand_instance):
+            raise InputError(f"model {hand!r} has no frame {gripper_frame!r}")
+
+        joints = [plant.get_joint(j) for j in plant.GetJointIndices(arm_instance)]
+        joints = [joint for joint in joints if joint.num_positions() == 1]
+        self._index = np.array([joint.position_start() for joint in joints])
+        self.joint_names = [joint.name() for joint in joints]
+        self.limits = _joint_limits(plant, self._index, acceleration)
+        hand_joints = [plant.get_joint(j) for j in plant.GetJointIndices(hand_instance)]
+        self._fingers = [joint for joint in hand_joints if joint.num_positions() == 1]
+        self._hand_bodies = plant.GetBodyIndices(hand_instance)
+
+        weights = np.full(plant.num_positions(), 1.0)
+        weights[self._index] = _lever_arms(plant, self._index, arm_instance, hand_instance)
+        self.checker = SceneGraphCollisionChecker(
+            model=builder.Build(),
+            robot_model_instances=[arm_instance, hand_instance],
+            edge_step_size=edge_step,
+            env_collision_padding=padding,
+            distance_and_interpolation_provider=LinearDistanceAndInterpolationProvider(
+                plant, weights
+            ),
+            implicit_context_parallelism=Parallelism(1),
+        )
+        self.plant = self.checker.plant()
+        for i, a in enumerate(self._hand_bodies):
+            for b in self._hand_bodies[i + 1 :]:
+                self.checker.SetCollisionFilteredBetween(a, b, True)
+        self.weights = weights[self._index]
+        self.frame_G: Frame = self.plant.GetFrameByName(gripper_frame, hand_instance)
+        self._context = self.plant.CreateDefaultContext()
+        self._q = self.plant.GetPositions(self._context)
+        self._padding = padding
+        self.set_hand_width(np.inf)
+
+    @property
+    def num_joints(self) -> int:
+        """Number n of joints of the arm."""
+        return len(self._index)
+
+    @property
+    def q_default(self) -> FloatArray:
+        """The default positions of the arm in its model or scenario file, (n,)."""
+        return self.plant.GetPositions(self.plant.CreateDefaultContext())[self._index]
+
+    def full(self, q: FloatArray) -> FloatArray:
+        """Positions of the whole plant with the arm at q."""
+        positions = self._q.copy()
+        positions[self._index] = q
+        return positions
+
+    def pose(self, q: FloatArray) -> RigidTransform:
+        """X_WG of the arm at q."""
+        self._q[self._index] = q
+        self.plant.SetPositions(self._context, self._q)
+        return self.frame_G.CalcPoseInWorld(self._context)
+
+    def pose_and_jacobian(self, q: FloatArray) -> tuple[RigidTransform, FloatArray]:
+        """X_WG and J, (6, n), with V_WG = J qdot (rotational rows first, expressed in W)."""
+        X_WG = self.pose(q)
+        W = self.plant.world_frame()
+        J = self.plant.CalcJacobianSpatialVelocity(
+            self._context, JacobianWrtVariable.kQDot, self.frame_G, np.zeros(3), W, W
+        )
+        return X_WG, J[:, self._index]
+
+    def set_hand_width(self, width: float) -> None:
+        """Opening of the hand (m) in all collision checks from now on, cut to its limits."""
+        for joint in self._fingers:
+            lower, upper = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+            # A finger opens toward the end of its range that is farther from zero.
+            sign = 1.0 if abs(upper) >= abs(lower) else -1.0
+            self._q[joint.position_start()] = np.clip(0.5 * sign * width, lower, upper)
+
+    @property
+    def padding(self) -> float:
+        """Clearance kept between the robot and its surroundings (m)."""
+        return self._padding
+
+    def set_padding(self, padding: float) -> None:
+        """Clearance to keep between the robot and its surroundings (m) from now on."""
+        self._padding = padding
+        self.checker.SetPaddingAllRobotEnvironmentPairs(padding)
+
+    def set_obstacles(self, shapes: Sequence[tuple[Shape, RigidTransform]]) -> None:
+        """Replaces the added fixed obstacles by the given shapes and their poses X_WS."""
+        self.checker.RemoveAllAddedCollisionShapes("obstacles")
+        world = self.plant.world_body()
+        for shape, X_WS in shapes:
+            self.checker.AddCollisionShapeToBody("obstacles", world, shape, X_WS)
+
+    def attach(self, shape: Shape, X_GS: RigidTransform) -> None:
+        """Holds the shape in the hand, at X_GS, in place of anything held before."""
+        self.detach()
+        self.checker.AddCollisionShapeToFrame("held", self.frame_G, shape, X_GS)
+
+    def detach(self) -> None:
+        """Holds nothing in the hand any more."""
+        self.checker.RemoveAllAddedCollisionShapes("held")
+
+    def is_free(self, q: FloatArray) -> bool:
+        """Whether the arm at q, (n,), touches neither itself nor its surroundings."""
+        return self.checker.CheckConfigCollisionFree(self.full(q))
+
+    def edge_is_free(self, q_A: FloatArray, q_B: FloatArray) -> bool:
+        """Whether the straight line in joint space is free, checked every ``edge_step``."""
+        return self.checker.CheckEdgeCollisionFree(self.full(q_A), self.full(q_B))
+
+    def path_is_free(self, path: FloatArray) -> bool:
+        """Whether all edges of the path, (K, n), are free."""
+        return all(self.edge_is_free(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
+
+    def first_collision(self, path: FloatArray) -> str:
+        """The first configuration of a path (K, n) that collides, in words ("" if none does)."""
+        for q in path:
+            if not self.is_free(q):
+                return self.collisions(q)
+        return ""
+
+    def collisions(self, q: FloatArray) -> str:
+        """The pairs of bodies in collision at q, in words ("" if there are none)."""
+        clearance = self.checker.CalcRobotClearance(self.full(q), self._padding + 1e-6)
+        rows = zip(
+            clearance.robot_indices(),
+            clearance.other_indices(),
+            clearance.distances(),
+            strict=True,
+        )
+        # Distances are reported net of padding.
+        pairs = sorted(
+            {f"{self._body(a)} and {self._body(b)}" for a, b, distance in rows if distance < 0.0}
+        )
+        return ", ".join(pairs)
+
+    def _body(self, index) -> str:
+        body = self.plant.get_body(index)
+        if index == self.plant.world_body().index():
+            return "an obstacle"
+        return f"{self.plant.GetModelInstanceName(body.model_instance())}::{body.name()}"
+
+
+def _joint_limits(
+    plant: MultibodyPlant, index: NDArray[np.int_], acceleration: Sequence[float] | None
+) -> JointLimits:
+    velocity = np.minimum(
+        np.abs(plant.GetVelocityLowerLimits()), np.abs(plant.GetVelocityUpperLimits())
+    )[index]
+    if acceleration is not None:
+        limit = np.asarray(acceleration, dtype=float)
+    else:
+        limit = np.minimum(
+            np.abs(plant.GetAccelerationLowerLimits()), np.abs(plant.GetAccelerationUpperLimits())
+        )[index]
+        limit = np.where(np.isfinite(limit), limit, 5.0 * velocity)
+    if limit.shape != velocity.shape or not np.all(np.isfinite(velocity)) or np.any(limit <= 0.0):
+        raise InputError("every joint of the arm needs finite, positive velocity and acceleration")
+    return JointLimits(
+        plant.GetPositionLowerLimits()[index],
+        plant.GetPositionUpperLimits()[index],
+        velocity,
+        limit,
+    )
+
+
+def _lever_arms(plant: MultibodyPlant, index: NDArray[np.int_], *instances) -> FloatArray:
+    """For each joint, how far its axis is from the farthest body origin it moves (m), stretched.
+
+    Measured at zero positions, where serial arms are stretched out; at least 0.1 m, for the
+    bodies' own extent.
+    """
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, np.zeros(plant.num_positions()))
+    bodies = [plant.get_body(i) for instance in instances for i in plant.GetBodyIndices(instance)]
+    origins = np.array([body.EvalPoseInWorld(context).translation() for body in bodies])
+    arms = np.full(len(index), 0.1)
+    joints = [plant.get_joint(j) for j in plant.GetJointIndices()]
+    starts = {joint.position_start(): joint for joint in joints if joint.num_positions() == 1}
+    for k, start in enumerate(index):
+        joint = starts[start]
+        p_WJ = joint.frame_on_child().CalcPoseInWorld(context).translation()
+        moved = set(plant.GetBodiesKinematicallyAffectedBy([joint.index()]))
+        reach = [
+            float(np.linalg.norm(p - p_WJ))
+            for body, p in zip(bodies, origins, strict=True)
+            if body.index() in moved
+        ]
+        arms[k] = max([0.0, *reach]) + 0.1
+    return arms

@@ -1,0 +1,388 @@
+"""Plans of whole moves of an arm with a hand: to a grasp and up, to a drop and away, and home."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Shape
+from pydrake.math import RigidTransform, RotationMatrix
+
+from prehensile.planning.arm import ArmModel
+from prehensile.planning.cartesian import plan_cartesian
+from prehensile.planning.inverse_kinematics import refine, starting_points
+from prehensile.planning.joint_path import plan_joint_path
+from prehensile.planning.trajectory import TimedPath, join_paths, time_parameterize
+
+FloatArray = NDArray[np.float64]
+
+# The same grasp with the two fingers exchanged: half a turn about the approach axis.
+X_GFlipped = RigidTransform(RotationMatrix.MakeYRotation(np.pi))
+
+
+@dataclass(frozen=True)
+class MoveOptions:
+    """How to move.
+
+    Attributes:
+        speed: factor on the joint velocity limits of free motions, in (0, 1].
+        near_speed: the same on straight lines near objects, in (0, 1].
+        carry_speed: the same with an object in the hand, in (0, 1].
+        acceleration: factor on the joint acceleration limits, in (0, 1].
+        carry_acceleration: the same with an object in the hand, in (0, 1].
+        near_padding: clearance from the surroundings on straight lines near objects (m); free
+            motions keep the arm model's own clearance where their ends allow it.
+        deviation: how far free motions may pass from their corners (rad).
+        starts: starts of inverse kinematics per pose (>= 1).
+        max_poses: grasps or drops tried before giving up (>= 1).
+    """
+
+    speed: float = 0.8
+    near_speed: float = 0.5
+    carry_speed: float = 0.7
+    acceleration: float = 0.9
+    carry_acceleration: float = 0.6
+    near_padding: float = 0.001
+    deviation: float = 0.05
+    starts: int = 5
+    max_poses: int = 20
+
+
+@dataclass(frozen=True)
+class MovePlan:
+    """A motion to one configuration; `motion` is None where none was found."""
+
+    motion: TimedPath | None
+    reason: str = ""
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a motion."""
+        return self.motion is not None
+
+
+@dataclass(frozen=True)
+class PickPlan:
+    """The motions of a pick: to the grasp by way of a pose in front of it, and straight up.
+
+    Attributes:
+        index: which of the grasps it reaches (-1: none).
+        X_WG: the pose of the hand at the grasp (possibly the given one with fingers exchanged).
+        approach: from the start to the grasp, passing the pre-grasp pose without a stop.
+        lift: from the grasp straight up.
+        rejected: why each grasp before it, or every one, was passed over.
+    """
+
+    index: int
+    X_WG: RigidTransform | None
+    approach: TimedPath | None
+    lift: TimedPath | None
+    rejected: tuple[str, ...]
+
+    @property
+    def found(self) -> bool:
+        """Whether a grasp can be reached."""
+        return self.index >= 0
+
+    @property
+    def reason(self) -> str:
+        """Why no grasp can be reached, in words ("" if one can)."""
+        return "" if self.found else "; ".join(self.rejected) or "no grasps were given"
+
+
+@dataclass(frozen=True)
+class PlacePlan:
+    """The motions of placing: to the drop from above, and back up.
+
+    Attributes:
+        index: which of the drop poses it reaches (-1: none).
+        X_WG: the pose of the hand at the drop.
+        carry: from the start to the drop.
+        retreat: from the drop straight back up (None if the approach height is zero).
+        rejected: why each drop before it, or every one, was passed over.
+    """
+
+    index: int
+    X_WG: RigidTransform | None
+    carry: TimedPath | None
+    retreat: TimedPath | None
+    rejected: tuple[str, ...]
+
+    @property
+    def found(self) -> bool:
+        """Whether a drop can be reached."""
+        return self.index >= 0
+
+    @property
+    def reason(self) -> str:
+        """Why no drop can be reached, in words ("" if one can)."""
+        return "" if self.found else "; ".join(self.rejected) or "no drops were given"
+
+
+def plan_move(
+    arm: ArmModel,
+    q_start: FloatArray,
+    q_goal: FloatArray,
+    *,
+    rng: np.random.Generator | None = None,
+    held: tuple[Shape, RigidTransform] | None = None,
+    options: MoveOptions = MoveOptions(),
+) -> MovePlan:
+    """A collision-free motion from one configuration to another, such as home.
+
+    Args:
+        arm: the arm and its surroundings.
+        q_start, q_goal: ends of the motion (n,).
+        rng: of the search; seed 0 if it is not given.
+        held: shape of an object in the hand and its pose X_GS.
+        options: how to move.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    with _holding(arm, held):
+        path, reason = _free_path(arm, q_start, q_goal, rng, options)
+        if path is None:
+            return MovePlan(None, reason)
+        motion, reason = _timed(arm, [path], [_speed(held, options)], held, options)
+        return MovePlan(motion, reason)
+
+
+def plan_pick(
+    arm: ArmModel,
+    q_start: FloatArray,
+    grasps: Sequence[RigidTransform],
+    *,
+    widths: Sequence[float] | None = None,
+    pregrasp_distance: float = 0.1,
+    lift_height: float = 0.25,
+    rng: np.random.Generator | None = None,
+    options: MoveOptions = MoveOptions(),
+) -> PickPlan:
+    """Motions to the first of the grasps, in their order, that can be reached.
+
+    The hand goes to the pre-grasp pose, `pregrasp_distance` behind the grasp along its approach
+    axis y_G, moves in on a straight line, and afterwards straight up in the world. Both ways to
+    hold the hand (fingers exchanged) are considered, nearer configurations first.
+
+    Args:
+        arm: the arm and its surroundings.
+        q_start: where the arm is (n,).
+        grasps: poses X_WG, best first.
+        widths: opening of the hand (m) at each grasp; as it is in the arm model if not given.
+        pregrasp_distance: length of the straight line in (m, > 0).
+        lift_height: length of the straight line up (m, > 0).
+        rng: of all random choices; seed 0 if it is not given.
+        options: how to move.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    rejected: list[str] = []
+    for index, X_WGrasp in enumerate(grasps[: options.max_poses]):
+        if widths is not None:
+            arm.set_hand_width(widths[index])
+        choices, reason = _configurations(
+            arm, [X_WGrasp, X_WGrasp @ X_GFlipped], q_start, rng, options
+        )
+        for q_grasp in choices:
+            X_WG = arm.pose(q_grasp)
+            X_WGpre = X_WG @ RigidTransform([0.0, -pregrasp_distance, 0.0])
+            X_WGlift = RigidTransform(X_WG.rotation(), X_WG.translation() + [0, 0, lift_height])
+            with _padding(arm, options.near_padding):
+                back = plan_cartesian(arm, q_grasp, X_WGpre)
+                up = plan_cartesian(arm, q_grasp, X_WGlift) if back.found else back
+            if not up.found:
+                reason = ("approach: " if not back.found else "lift: ") + up.reason
+                continue
+            path, reason = _free_path(arm, q_start, back.path[-1], rng, options)
+            if path is None:
+                continue
+            approach, reason = _timed(
+                arm, [path, back.path[::-1]], [options.speed, options.near_speed], None, options
+            )
+            lift = time_parameterize(
+                up.path,
+                arm.limits.scaled(1.0, options.carry_acceleration),
+                speed=options.carry_speed,
+            )
+            if approach is not None:
+                return PickPlan(index, X_WG, approach, lift, tuple(rejected))
+        rejected.append(f"grasp {index}: {reason}")
+    return PickPlan(-1, None, None, None, tuple(rejected))
+
+
+def plan_place(
+    arm: ArmModel,
+    q_start: FloatArray,
+    drops: Sequence[RigidTransform],
+    *,
+    approach_height: float = 0.1,
+    held: tuple[Shape, RigidTransform] | None = None,
+    flip: bool = True,
+    rng: np.random.Generator | None = None,
+    options: MoveOptions = MoveOptions(),
+) -> PlacePlan:
+    """Motions to the first of the drop poses, in their order, that can be reached.
+
+    Args:
+        arm: the arm and its surroundings.
+        q_start: where the arm is (n,).
+        drops: poses X_WG at which the hand opens, best first.
+        approach_height: length of the straight lines down to the drop and up again (m); 0 to
+            drop from where the free motion ends.
+        held: shape of the object in the hand and its pose X_GS; keeps clear of everything.
+        flip: whether the hand may be turned by half a turn about its approach axis.
+        rng: of all random choices; seed 0 if it is not given.
+        options: how to move.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    rejected: list[str] = []
+    for index, X_WDrop in enumerate(drops[: options.max_poses]):
+        with _holding(arm, held):
+            poses = [X_WDrop, X_WDrop @ X_GFlipped] if flip else [X_WDrop]
+            choices, reason = _configurations(arm, poses, q_start, rng, options)
+            for q_drop in choices:
+                X_WG = arm.pose(q_drop)
+                up = np.array([q_drop])
+                if approach_height > 0.0:
+                    above = X_WG.translation() + [0.0, 0.0, approach_height]
+                    with _padding(arm, options.near_padding):
+                        line = plan_cartesian(arm, q_drop, RigidTransform(X_WG.rotation(), above))
+                    if not line.found:
+                        reason = f"line down: {line.reason}"
+                        continue
+                    up = line.path
+                path, reason = _free_path(arm, q_start, up[-1], rng, options)
+                if path is None:
+                    continue
+                carry, reason = _timed(
+                    arm, [path, up[::-1]], [options.carry_speed, options.near_speed], held, options
+                )
+                if carry is not None:
+                    retreat = None
+                    if len(up) > 1:
+                        retreat = time_parameterize(
+                            up, arm.limits.scaled(1.0, options.acceleration), speed=options.speed
+                        )
+                    return PlacePlan(index, X_WG, carry, retreat, tuple(rejected))
+        rejected.append(f"drop {index}: {reason}")
+    return PlacePlan(-1, None, None, None, tuple(rejected))
+
+
+def drop_poses(
+    center: FloatArray,
+    half_extent: FloatArray,
+    rng: np.random.Generator,
+    count: int,
+    R_WG: RotationMatrix | None = None,
+) -> list[RigidTransform]:
+    """Hand poses for drops spread over a box, pointing down, turned at random about the vertical.
+
+    Args:
+        center: centre of the box in W (3,).
+        half_extent: half its size along the axes of W (3,).
+        rng: of positions and turns.
+        count: how many poses.
+        R_WG: the orientation that is turned about the vertical; straight down if not given.
+    """
+    down = RotationMatrix.MakeXRotation(-0.5 * np.pi) if R_WG is None else R_WG
+    poses = []
+    for _ in range(count):
+        p_WG = center + rng.uniform(-1.0, 1.0, 3) * half_extent
+        turn = RotationMatrix.MakeZRotation(rng.uniform(-np.pi, np.pi))
+        poses.append(RigidTransform(turn @ down, p_WG))
+    return poses
+
+
+def travel_time(arm: ArmModel, q_A: FloatArray, q_B: FloatArray) -> float:
+    """Seconds that the slowest joint needs at its velocity limit; a distance to compare by."""
+    return float(np.max(np.abs(q_B - q_A) / arm.limits.velocity))
+
+
+def _configurations(
+    arm: ArmModel,
+    poses: Sequence[RigidTransform],
+    q_start: FloatArray,
+    rng: np.random.Generator,
+    options: MoveOptions,
+) -> tuple[list[FloatArray], str]:
+    """Free configurations at any of the poses, the nearest first; the reason if there are none."""
+    found: list[FloatArray] = []
+    reason = "out of reach"
+    q_default = arm.q_default
+    for X_WG in poses:
+        for k, start in enumerate(starting_points(arm, q_start, rng, options.starts)):
+            q, error = refine(arm, X_WG, q_default if k == 1 else start)
+            if error > 1e-6 or any(np.max(np.abs(q - other)) < 0.1 for other in found):
+                continue
+            with _padding(arm, options.near_padding):
+                if arm.is_free(q):
+                    found.append(q)
+                else:
+                    reason = f"collides: {arm.collisions(q)}"
+    return sorted(found, key=lambda q: travel_time(arm, q_start, q)), reason
+
+
+def _free_path(
+    arm: ArmModel,
+    q_start: FloatArray,
+    q_goal: FloatArray,
+    rng: np.random.Generator,
+    options: MoveOptions,
+) -> tuple[FloatArray | None, str]:
+    """A path with the model's clearance, or with the small one where an end needs that."""
+    ends_clear = arm.is_free(q_start) and arm.is_free(q_goal)
+    with _padding(arm, arm.padding if ends_clear else options.near_padding):
+        result = plan_joint_path(arm, q_start, q_goal, rng=rng)
+    return (result.path, "") if result.found else (None, result.reason)
+
+
+def _timed(
+    arm: ArmModel,
+    paths: Sequence[FloatArray],
+    speeds: Sequence[float],
+    held: object,
+    options: MoveOptions,
+) -> tuple[TimedPath | None, str]:
+    """One motion along all paths, checked again as it will be moved."""
+    path = join_paths(*paths)
+    speed = np.concatenate(
+        [np.full(len(join_paths(p)) - 1, v) for p, v in zip(paths, speeds, strict=True)]
+    )
+    acceleration = options.acceleration if held is None else options.carry_acceleration
+    limits = arm.limits.scaled(1.0, acceleration)
+    reason = ""
+    for deviation in (options.deviation, 0.2 * options.deviation, 1e-3):
+        motion = time_parameterize(path, limits, speed=speed, deviation=deviation)
+        with _padding(arm, min(arm.padding, 0.5 * options.near_padding)):
+            samples = motion.sample()
+            if arm.path_is_free(samples):
+                return motion, ""
+            reason = f"the motion collides: {arm.first_collision(samples) or 'on its way'}"
+    return None, reason
+
+
+def _speed(held: object, options: MoveOptions) -> float:
+    return options.speed if held is None else options.carry_speed
+
+
+@contextmanager
+def _padding(arm: ArmModel, padding: float) -> Iterator[None]:
+    """Another clearance for a while."""
+    before = arm.padding
+    arm.set_padding(padding)
+    try:
+        yield
+    finally:
+        arm.set_padding(before)
+
+
+@contextmanager
+def _holding(arm: ArmModel, held: tuple[Shape, RigidTransform] | None) -> Iterator[None]:
+    """An object in the hand for a while."""
+    if held is None:
+        yield
+        return
+    arm.attach(*held)
+    try:
+        yield
+    finally:
+        arm.detach()
