@@ -1,0 +1,32 @@
+"""The box of boards that shelves and the cupboard have in common; open to the front, +x."""
+
+from prehensile.models.generate.furniture._parts import Block
+from prehensile.models.generate.sdf_model import Contact
+
+DEPTH, WIDTH, HEIGHT = 0.3, 0.6, 0.8  # m, along x, y, z
+BOARD = 0.018  # m, thickness of all boards
+COMPARTMENTS = 3
+MASS = 14.0  # kg
+
+WOOD = Contact(mu=0.5, hydroelastic="rigid", relaxation_time=0.02)
+
+
+def floors() -> list[float]:
+    """Height of the surface on which things stand in each compartment, lowest first, m."""
+    clear = (HEIGHT - BOARD) / COMPARTMENTS
+    return [round(BOARD + i * clear, 6) for i in range(COMPARTMENTS)]
+
+
+def blocks() -> list[Block]:
+    """The boards; z = 0 is the underside."""
+    x, y = DEPTH / 2, WIDTH / 2
+    inner = y - BOARD
+    boards = [
+        Block("side_left", (-x, y - BOARD, 0.0), (x, y, HEIGHT)),
+        Block("side_right", (-x, -y, 0.0), (x, -y + BOARD, HEIGHT)),
+        Block("back", (-x, -inner, 0.0), (-x + BOARD, inner, HEIGHT)),
+        Block("top", (-x + BOARD, -inner, HEIGHT - BOARD), (x, inner, HEIGHT)),
+    ]
+    for i, z in enumerate(floors()):
+        boards.append(Block(f"shelf_{i}", (-x + BOARD, -inner, z - BOARD), (x, inner, z)))
+    return boards
