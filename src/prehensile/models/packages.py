@@ -148,7 +148,7 @@ def resolve(url: str, packages: Mapping[str, Path]) -> Path:
     elif name == "drake_models":
         raise InputError(
             Finding(
-                f"Drake's model package, wanted by '{url}', is not on this machine",
+                "Drake's model package 'drake_models' is not on this machine",
                 "name its folder: 'packages: {drake_models: PATH}' in the scenario, or "
                 f"{MODEL_PATH_VARIABLE}=PATH in the environment",
             )
@@ -157,7 +157,7 @@ def resolve(url: str, packages: Mapping[str, Path]) -> Path:
         known = ", ".join(sorted({"drake", *packages}))
         raise InputError(
             Finding(
-                f"unknown package '{name}' in '{url}'",
+                f"unknown package '{name}'",
                 f"known are {known}; name a folder under 'packages:' in the scenario, or in "
                 f"{MODEL_PATH_VARIABLE}",
             )
@@ -189,9 +189,7 @@ def inside(root: Path, path: Path, said: str) -> Path:
                 )
             )
         if not real.is_file():
-            raise InputError(
-                Finding(f"there is no file '{said}'", f"looked for it at {path}")
-            )
+            raise InputError(Finding(f"there is no file '{said}'", f"looked for it at {path}"))
     except (OSError, RuntimeError, ValueError) as error:
         if isinstance(error, InputError):
             raise

@@ -40,6 +40,7 @@ class Scenario:
         model_drivers: driver configuration by model instance name; the type is what the
             driver registry (:mod:`prehensile.station.drivers`) holds for its YAML tag.
         cameras: Drake's camera settings by key.
+        camera_ids: serial numbers of the real cameras by the same keys (hardware only).
         visualization: Drake's visualization settings.
         packages: our key: further model folders, package name to absolute path.
         file: where it was read from (None if it was made in Python).
@@ -56,6 +57,7 @@ class Scenario:
     )
     model_drivers: dict[str, Any] = dc.field(default_factory=dict)
     cameras: dict[str, CameraConfig] = dc.field(default_factory=dict)
+    camera_ids: dict[str, str] = dc.field(default_factory=dict)
     visualization: VisualizationConfig = dc.field(default_factory=VisualizationConfig)
     packages: dict[str, str] = dc.field(default_factory=dict)
     file: Path | None = None
