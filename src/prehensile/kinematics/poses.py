@@ -1,14 +1,11 @@
 """Small functions on poses: the difference of two, and the straight line between two."""
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
-FloatArray = NDArray[np.float64]
 
-
-def rotation_vector(R: FloatArray) -> FloatArray:
+def rotation_vector(R: np.ndarray) -> np.ndarray:
     """Logarithm of a rotation: unit axis times angle.
 
     Args:
@@ -31,7 +28,7 @@ def rotation_vector(R: FloatArray) -> FloatArray:
     return column * (angle / float(np.linalg.norm(column)))
 
 
-def pose_error(X_WA: RigidTransform, X_WB: RigidTransform) -> FloatArray:
+def pose_error(X_WA: RigidTransform, X_WB: RigidTransform) -> np.ndarray:
     """The motion that takes frame A to frame B, in the order of a spatial velocity.
 
     Returns:

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common import Parallelism
 from pydrake.geometry import Shape
 from pydrake.math import RigidTransform
@@ -18,8 +18,6 @@ from pydrake.planning import (
 
 from prehensile.errors import InputError
 
-FloatArray = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class JointLimits:
@@ -31,12 +29,12 @@ class JointLimits:
         acceleration: largest absolute acceleration.
     """
 
-    lower: FloatArray
-    upper: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
 
-    def contain(self, q: FloatArray, tolerance: float = 0.0) -> bool:
+    def contain(self, q: np.ndarray, tolerance: float = 0.0) -> bool:
         """Whether all positions of q, (n,) or (K, n), lie within the limits."""
         return bool(np.all(q >= self.lower - tolerance) and np.all(q <= self.upper + tolerance))
 
@@ -143,23 +141,23 @@ class ArmModel:
         return len(self._index)
 
     @property
-    def q_default(self) -> FloatArray:
+    def q_default(self) -> np.ndarray:
         """The default positions of the arm in its model or scenario file, (n,)."""
         return self.plant.GetPositions(self.plant.CreateDefaultContext())[self._index]
 
-    def full(self, q: FloatArray) -> FloatArray:
+    def full(self, q: np.ndarray) -> np.ndarray:
         """Positions of the whole plant with the arm at q."""
         positions = self._q.copy()
         positions[self._index] = q
         return positions
 
-    def pose(self, q: FloatArray) -> RigidTransform:
+    def pose(self, q: np.ndarray) -> RigidTransform:
         """X_WG of the arm at q."""
         self._q[self._index] = q
         self.plant.SetPositions(self._context, self._q)
         return self.frame_G.CalcPoseInWorld(self._context)
 
-    def pose_and_jacobian(self, q: FloatArray) -> tuple[RigidTransform, FloatArray]:
+    def pose_and_jacobian(self, q: np.ndarray) -> tuple[RigidTransform, np.ndarray]:
         """X_WG and J, (6, n), with V_WG = J qdot (rotational rows first, expressed in W)."""
         X_WG = self.pose(q)
         W = self.plant.world_frame()
@@ -202,26 +200,26 @@ class ArmModel:
         """Holds nothing in the hand any more."""
         self.checker.RemoveAllAddedCollisionShapes("held")
 
-    def is_free(self, q: FloatArray) -> bool:
+    def is_free(self, q: np.ndarray) -> bool:
         """Whether the arm at q, (n,), touches neither itself nor its surroundings."""
         return self.checker.CheckConfigCollisionFree(self.full(q))
 
-    def edge_is_free(self, q_A: FloatArray, q_B: FloatArray) -> bool:
+    def edge_is_free(self, q_A: np.ndarray, q_B: np.ndarray) -> bool:
         """Whether the straight line in joint space is free, checked every ``edge_step``."""
         return self.checker.CheckEdgeCollisionFree(self.full(q_A), self.full(q_B))
 
-    def path_is_free(self, path: FloatArray) -> bool:
+    def path_is_free(self, path: np.ndarray) -> bool:
         """Whether all edges of the path, (K, n), are free."""
-        return all(self.edge_is_free(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
+        return all(self.edge_is_free(a, b) for a, b in pairwise(path))
 
-    def first_collision(self, path: FloatArray) -> str:
+    def first_collision(self, path: np.ndarray) -> str:
         """The first configuration of a path (K, n) that collides, in words ("" if none does)."""
         for q in path:
             if not self.is_free(q):
                 return self.collisions(q)
         return ""
 
-    def collisions(self, q: FloatArray) -> str:
+    def collisions(self, q: np.ndarray) -> str:
         """The pairs of bodies in collision at q, in words ("" if there are none)."""
         clearance = self.checker.CalcRobotClearance(self.full(q), self._padding + 1e-6)
         rows = zip(
@@ -244,7 +242,7 @@ class ArmModel:
 
 
 def _joint_limits(
-    plant: MultibodyPlant, index: NDArray[np.int_], acceleration: Sequence[float] | None
+    plant: MultibodyPlant, index: np.ndarray, acceleration: Sequence[float] | None
 ) -> JointLimits:
     velocity = np.minimum(
         np.abs(plant.GetVelocityLowerLimits()), np.abs(plant.GetVelocityUpperLimits())
@@ -266,7 +264,7 @@ def _joint_limits(
     )
 
 
-def _lever_arms(plant: MultibodyPlant, index: NDArray[np.int_], *instances) -> FloatArray:
+def _lever_arms(plant: MultibodyPlant, index: np.ndarray, *instances) -> np.ndarray:
     """For each joint, how far its axis is from the farthest body origin it moves (m), stretched.
 
     Measured at zero positions, where serial arms are stretched out; at least 0.1 m, for the

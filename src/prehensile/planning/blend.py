@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,18 +17,18 @@ class SmoothPath:
         leg: index of the polyline's leg that each interval lies on, (M,).
     """
 
-    s: FloatArray
-    q: FloatArray
-    slope_start: FloatArray
-    slope_end: FloatArray
-    leg: NDArray[np.int_]
+    s: np.ndarray
+    q: np.ndarray
+    slope_start: np.ndarray
+    slope_end: np.ndarray
+    leg: np.ndarray
 
     @property
-    def curvature(self) -> FloatArray:
+    def curvature(self) -> np.ndarray:
         """d2q/ds2 on each interval (M, n)."""
         return (self.slope_end - self.slope_start) / np.diff(self.s)[:, None]
 
-    def position(self, s: FloatArray) -> FloatArray:
+    def position(self, s: np.ndarray) -> np.ndarray:
         """Positions (K, n) at path parameters s (K,)."""
         i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.leg) - 1)
         d = (s - self.s[i])[:, None]
@@ -39,7 +36,7 @@ class SmoothPath:
 
 
 def round_corners(
-    path: FloatArray, deviation: float, *, max_interval: float = 0.05, corner_intervals: int = 4
+    path: np.ndarray, deviation: float, *, max_interval: float = 0.05, corner_intervals: int = 4
 ) -> SmoothPath:
     """Replaces each corner of a polyline by a parabola that is tangent to both legs.
 
@@ -62,8 +59,8 @@ def round_corners(
         0.5 * np.minimum(length[:-1], length[1:]), 4.0 * deviation / np.maximum(turn, 1e-12)
     )
     steps: list[float] = []
-    starts: list[FloatArray] = []
-    ends: list[FloatArray] = []
+    starts: list[np.ndarray] = []
+    ends: list[np.ndarray] = []
     legs: list[int] = []
     for k, u in enumerate(direction):
         straight = length[k] - cut[k] - cut[k + 1]

@@ -1,17 +1,15 @@
 """Straight lines of the hand in the workspace."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from prehensile.kinematics.poses import pose_error, straight_line
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.inverse_kinematics import refine
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class PathResult:
     """
 
     status: Literal["found", "start", "goal", "collision", "limits", "jump", "budget"]
-    path: FloatArray
+    path: np.ndarray
     reason: str = ""
 
     @property
@@ -36,7 +34,7 @@ class PathResult:
 
 def plan_cartesian(
     arm: ArmModel,
-    q_start: FloatArray,
+    q_start: np.ndarray,
     X_WG_goal: RigidTransform,
     *,
     max_translation: float = 0.01,
@@ -72,7 +70,7 @@ def plan_cartesian(
 
     if check_collisions and not arm.is_free(path[0]):
         return failed("collision", f"the start collides: {arm.collisions(path[0])}")
-    for X_WA, X_WB in zip(poses[:-1], poses[1:], strict=True):
+    for X_WA, X_WB in pairwise(poses):
         X, J = arm.pose_and_jacobian(path[-1])
         guess = path[-1] + np.linalg.lstsq(J, pose_error(X, X_WB), rcond=1e-3)[0]
         q, error = refine(arm, X_WB, guess, max_iterations=20)

@@ -5,13 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from prehensile.kinematics.poses import pose_error
 from prehensile.planning.arm import ArmModel
-
-FloatArray = NDArray[np.float64]
 
 # Metres are weighted against radians as by a hand of this size.
 _METRE = 3.0
@@ -32,7 +29,7 @@ class IkResult:
     """
 
     status: Literal["solved", "unreachable", "limits", "collision"]
-    q: FloatArray
+    q: np.ndarray
     reason: str = ""
     starts: int = 1
 
@@ -45,12 +42,12 @@ class IkResult:
 def refine(
     arm: ArmModel,
     X_WG: RigidTransform,
-    q_guess: FloatArray,
+    q_guess: np.ndarray,
     *,
     tolerance: float = 1e-6,
     max_iterations: int = 50,
     within_limits: bool = True,
-) -> tuple[FloatArray, float]:
+) -> tuple[np.ndarray, float]:
     """Newton's method with damping from one guess; joints stop at their limits.
 
     Levenberg and Marquardt's step with damping proportional to the squared error (Sugihara,
@@ -95,8 +92,8 @@ def refine(
 
 
 def starting_points(
-    arm: ArmModel, q_guess: FloatArray, rng: np.random.Generator, max_starts: int
-) -> Iterator[FloatArray]:
+    arm: ArmModel, q_guess: np.ndarray, rng: np.random.Generator, max_starts: int
+) -> Iterator[np.ndarray]:
     """The guess, then random configurations within the limits."""
     yield q_guess
     lower = np.maximum(arm.limits.lower, -np.pi)
@@ -108,7 +105,7 @@ def starting_points(
 def solve_ik(
     arm: ArmModel,
     X_WG: RigidTransform,
-    q_guess: FloatArray,
+    q_guess: np.ndarray,
     *,
     rng: np.random.Generator | None = None,
     max_starts: int = 20,

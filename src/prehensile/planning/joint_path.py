@@ -1,18 +1,17 @@
 """Collision-free paths in joint space: RRT-Connect and shortcutting."""
 
+from typing import Literal
+
 import numpy as np
-from numpy.typing import NDArray
 
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import PathResult
 
-FloatArray = NDArray[np.float64]
-
 
 def plan_joint_path(
     arm: ArmModel,
-    q_start: FloatArray,
-    q_goal: FloatArray,
+    q_start: np.ndarray,
+    q_goal: np.ndarray,
     *,
     rng: np.random.Generator | None = None,
     max_iterations: int = 2000,
@@ -37,7 +36,9 @@ def plan_joint_path(
     """
     rng = np.random.default_rng(0) if rng is None else rng
     q_start, q_goal = np.array(q_start, dtype=float), np.array(q_goal, dtype=float)
-    for name, q in (("start", q_start), ("goal", q_goal)):
+    ends: tuple[tuple[Literal["start", "goal"], np.ndarray], ...]
+    ends = (("start", q_start), ("goal", q_goal))
+    for name, q in ends:
         if not arm.limits.contain(q, 1e-9):
             return PathResult(name, q_start[None], f"the {name} is beyond the joint limits")
         if not arm.is_free(q):
@@ -53,8 +54,8 @@ def plan_joint_path(
 
 
 def shorten(
-    arm: ArmModel, path: FloatArray, rng: np.random.Generator, shortcuts: int
-) -> FloatArray:
+    arm: ArmModel, path: np.ndarray, rng: np.random.Generator, shortcuts: int
+) -> np.ndarray:
     """Cuts corners of a free path (K, n): edges between random points of it, where free."""
     for _ in range(shortcuts):
         if len(path) < 3:
@@ -82,23 +83,23 @@ def shorten(
 class _Tree:
     """Configurations grown from one end, each with its parent."""
 
-    def __init__(self, root: FloatArray, capacity: int) -> None:
+    def __init__(self, root: np.ndarray, capacity: int) -> None:
         self.q = np.empty((capacity, len(root)))
         self.q[0] = root
         self.parent = [0]
 
-    def nearest(self, q: FloatArray, weights: FloatArray) -> int:
+    def nearest(self, q: np.ndarray, weights: np.ndarray) -> int:
         difference = (self.q[: len(self.parent)] - q) * weights
         return int(np.argmin(np.einsum("ij,ij->i", difference, difference)))
 
-    def add(self, q: FloatArray, parent: int) -> int:
+    def add(self, q: np.ndarray, parent: int) -> int:
         if len(self.parent) == len(self.q):
             self.q = np.vstack([self.q, np.empty_like(self.q)])
         self.q[len(self.parent)] = q
         self.parent.append(parent)
         return len(self.parent) - 1
 
-    def branch(self, node: int) -> list[FloatArray]:
+    def branch(self, node: int) -> list[np.ndarray]:
         """From the node back to the root."""
         path = [self.q[node]]
         while node:
@@ -109,18 +110,18 @@ class _Tree:
 
 def _rrt_connect(
     arm: ArmModel,
-    q_start: FloatArray,
-    q_goal: FloatArray,
+    q_start: np.ndarray,
+    q_goal: np.ndarray,
     rng: np.random.Generator,
     max_iterations: int,
     step: float = 0.3,
-) -> FloatArray | None:
+) -> np.ndarray | None:
     """A free path (K, n) or None; `step` is the weighted length of an edge (m)."""
     lower, upper = arm.limits.lower, arm.limits.upper
     start_tree, goal_tree = _Tree(q_start, 1024), _Tree(q_goal, 1024)
     a, b = start_tree, goal_tree
 
-    def grow(tree: _Tree, q: FloatArray, node: int) -> int | None:
+    def grow(tree: _Tree, q: np.ndarray, node: int) -> int | None:
         """One step from a node toward q; None if it is blocked."""
         difference = q - tree.q[node]
         length = float(np.linalg.norm(difference * arm.weights))

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -14,8 +13,6 @@ from prehensile.planning.cartesian import plan_cartesian
 from prehensile.planning.inverse_kinematics import refine, starting_points
 from prehensile.planning.joint_path import plan_joint_path
 from prehensile.planning.trajectory import TimedPath, join_paths, time_parameterize
-
-FloatArray = NDArray[np.float64]
 
 # The same grasp with the two fingers exchanged: half a turn about the approach axis.
 X_GFlipped = RigidTransform(RotationMatrix.MakeYRotation(np.pi))
@@ -122,8 +119,8 @@ class PlacePlan:
 
 def plan_move(
     arm: ArmModel,
-    q_start: FloatArray,
-    q_goal: FloatArray,
+    q_start: np.ndarray,
+    q_goal: np.ndarray,
     *,
     rng: np.random.Generator | None = None,
     held: tuple[Shape, RigidTransform] | None = None,
@@ -149,7 +146,7 @@ def plan_move(
 
 def plan_pick(
     arm: ArmModel,
-    q_start: FloatArray,
+    q_start: np.ndarray,
     grasps: Sequence[RigidTransform],
     *,
     widths: Sequence[float] | None = None,
@@ -185,7 +182,7 @@ def plan_pick(
         for q_grasp in choices:
             X_WG = arm.pose(q_grasp)
             X_WGpre = X_WG @ RigidTransform([0.0, -pregrasp_distance, 0.0])
-            X_WGlift = RigidTransform(X_WG.rotation(), X_WG.translation() + [0, 0, lift_height])
+            X_WGlift = RigidTransform([0.0, 0.0, lift_height]) @ X_WG
             with _padding(arm, options.near_padding):
                 back = plan_cartesian(arm, q_grasp, X_WGpre)
                 up = plan_cartesian(arm, q_grasp, X_WGlift) if back.found else back
@@ -211,7 +208,7 @@ def plan_pick(
 
 def plan_place(
     arm: ArmModel,
-    q_start: FloatArray,
+    q_start: np.ndarray,
     drops: Sequence[RigidTransform],
     *,
     approach_height: float = 0.1,
@@ -243,9 +240,9 @@ def plan_place(
                 X_WG = arm.pose(q_drop)
                 up = np.array([q_drop])
                 if approach_height > 0.0:
-                    above = X_WG.translation() + [0.0, 0.0, approach_height]
+                    X_WGabove = RigidTransform([0.0, 0.0, approach_height]) @ X_WG
                     with _padding(arm, options.near_padding):
-                        line = plan_cartesian(arm, q_drop, RigidTransform(X_WG.rotation(), above))
+                        line = plan_cartesian(arm, q_drop, X_WGabove)
                     if not line.found:
                         reason = f"line down: {line.reason}"
                         continue
@@ -268,8 +265,8 @@ def plan_place(
 
 
 def drop_poses(
-    center: FloatArray,
-    half_extent: FloatArray,
+    center: np.ndarray,
+    half_extent: np.ndarray,
     rng: np.random.Generator,
     count: int,
     R_WG: RotationMatrix | None = None,
@@ -292,7 +289,7 @@ def drop_poses(
     return poses
 
 
-def travel_time(arm: ArmModel, q_A: FloatArray, q_B: FloatArray) -> float:
+def travel_time(arm: ArmModel, q_A: np.ndarray, q_B: np.ndarray) -> float:
     """Seconds that the slowest joint needs at its velocity limit; a distance to compare by."""
     return float(np.max(np.abs(q_B - q_A) / arm.limits.velocity))
 
@@ -300,12 +297,12 @@ def travel_time(arm: ArmModel, q_A: FloatArray, q_B: FloatArray) -> float:
 def _configurations(
     arm: ArmModel,
     poses: Sequence[RigidTransform],
-    q_start: FloatArray,
+    q_start: np.ndarray,
     rng: np.random.Generator,
     options: MoveOptions,
-) -> tuple[list[FloatArray], str]:
+) -> tuple[list[np.ndarray], str]:
     """Free configurations at any of the poses, the nearest first; the reason if there are none."""
-    found: list[FloatArray] = []
+    found: list[np.ndarray] = []
     reason = "out of reach"
     q_default = arm.q_default
     for X_WG in poses:
@@ -323,11 +320,11 @@ def _configurations(
 
 def _free_path(
     arm: ArmModel,
-    q_start: FloatArray,
-    q_goal: FloatArray,
+    q_start: np.ndarray,
+    q_goal: np.ndarray,
     rng: np.random.Generator,
     options: MoveOptions,
-) -> tuple[FloatArray | None, str]:
+) -> tuple[np.ndarray | None, str]:
     """A path with the model's clearance, or with the small one where an end needs that."""
     ends_clear = arm.is_free(q_start) and arm.is_free(q_goal)
     with _padding(arm, arm.padding if ends_clear else options.near_padding):
@@ -337,7 +334,7 @@ def _free_path(
 
 def _timed(
     arm: ArmModel,
-    paths: Sequence[FloatArray],
+    paths: Sequence[np.ndarray],
     speeds: Sequence[float],
     held: object,
     options: MoveOptions,

@@ -1,14 +1,11 @@
 """The fastest motion along a path within velocity and acceleration limits."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from prehensile.planning.blend import SmoothPath
 
-FloatArray = NDArray[np.float64]
 
-
-def fastest_profile(path: SmoothPath, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+def fastest_profile(path: SmoothPath, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """Squared path speed at which the path is passed in the least time, at rest at both ends.
 
     Reachability analysis (Pham and Pham, "A new approach to time-optimal path parameterization
@@ -71,7 +68,7 @@ def fastest_profile(path: SmoothPath, velocity: FloatArray, acceleration: FloatA
     return np.minimum(x, reachable)
 
 
-def sample_profile(path: SmoothPath, x: FloatArray, period: float) -> FloatArray:
+def sample_profile(path: SmoothPath, x: np.ndarray, period: float) -> np.ndarray:
     """Path parameters at times 0, period, 2 period ... of a motion with squared speeds x.
 
     Args:

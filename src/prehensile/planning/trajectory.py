@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import BsplineBasis
 from pydrake.trajectories import BsplineTrajectory
 
@@ -12,8 +11,6 @@ from prehensile.errors import InputError
 from prehensile.planning.arm import JointLimits
 from prehensile.planning.blend import round_corners
 from prehensile.planning.time_optimal import fastest_profile, sample_profile
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,26 +23,26 @@ class TimedPath:
         duration: seconds.
     """
 
-    path: FloatArray
+    path: np.ndarray
     trajectory: BsplineTrajectory
     duration: float
 
-    def value(self, t: float) -> FloatArray:
+    def value(self, t: float) -> np.ndarray:
         """Joint positions (n,) at time t, held before the start and after the end."""
         return self.trajectory.value(min(max(t, 0.0), self.duration)).ravel()
 
     @property
-    def q_end(self) -> FloatArray:
+    def q_end(self) -> np.ndarray:
         """Where it ends (n,)."""
         return self.path[-1]
 
-    def sample(self, period: float = 0.02) -> FloatArray:
+    def sample(self, period: float = 0.02) -> np.ndarray:
         """Positions (T, n) every `period` seconds (at most), with both ends."""
         times = np.linspace(0.0, self.duration, max(2, int(np.ceil(self.duration / period)) + 1))
         return self.trajectory.vector_values(times).T
 
 
-def join_paths(*paths: FloatArray) -> FloatArray:
+def join_paths(*paths: np.ndarray) -> np.ndarray:
     """Paths (K_i, n) one after the other, the shared ends once; repeated waypoints are dropped."""
     path = np.vstack(paths)
     moved = np.linalg.norm(np.diff(path, axis=0), axis=1) > 1e-9
@@ -53,10 +50,10 @@ def join_paths(*paths: FloatArray) -> FloatArray:
 
 
 def time_parameterize(
-    path: FloatArray,
+    path: np.ndarray,
     limits: JointLimits,
     *,
-    speed: float | Sequence[float] | FloatArray = 1.0,
+    speed: float | Sequence[float] | np.ndarray = 1.0,
     deviation: float = 0.02,
     smoothing: float = 0.08,
     period: float = 0.01,
@@ -108,7 +105,7 @@ def time_parameterize(
     return TimedPath(path, trajectory, float(trajectory.end_time()))
 
 
-def _average(samples: FloatArray, window: int) -> FloatArray:
+def _average(samples: np.ndarray, window: int) -> np.ndarray:
     """Mean of each `window` samples in a row, as if the ends went on forever."""
     padded = np.vstack([samples[:1]] * (window - 1) + [samples] + [samples[-1:]] * (window - 1))
     # Differences are averaged and summed, so that the ends stay exact to rounding.
