@@ -1,0 +1,1 @@
+"""Seeing: Meshcat, replays, camera pictures, system diagrams, progress."""
