@@ -1,6 +1,6 @@
 """What a planner knows of an arm: kinematics, joint limits, and what may collide with what."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, JacobianWrtVariable
 from pydrake.planning import (
     LinearDistanceAndInterpolationProvider,
-    RobotDiagramBuilder,
+    RobotDiagram,
     SceneGraphCollisionChecker,
 )
 
@@ -63,7 +63,7 @@ class ArmModel:
 
     def __init__(
         self,
-        populate: Callable[[MultibodyPlant], object],
+        diagram: RobotDiagram,
         *,
         arm: str = "iiwa",
         hand: str = "wsg",
@@ -75,7 +75,7 @@ class ArmModel:
         """Builds the model.
 
         Args:
-            populate: adds arm, hand, table, bins ... to an empty plant.
+            diagram: arm, hand, table, bins ... but no free objects; the model owns it from here.
             arm: name of the arm's model instance.
             hand: name of the hand's model instance.
             gripper_frame: the frame G of the hand that plans are made for: y points from the
@@ -88,11 +88,7 @@ class ArmModel:
         Raises:
             InputError: if arm, hand or frame do not exist or the arm has no joints.
         """
-        builder = RobotDiagramBuilder(time_step=0.0)
-        populate(builder.plant())
-        plant = builder.plant()
-        if not plant.is_finalized():
-            plant.Finalize()
+        plant = diagram.plant()
         for name in (arm, hand):
             if not plant.HasModelInstanceNamed(name):
                 raise InputError(f"the plant has no model named {name!r}")
@@ -115,7 +111,7 @@ class ArmModel:
         weights = np.full(plant.num_positions(), 1.0)
         weights[self._index] = _lever_arms(plant, self._index, arm_instance, hand_instance)
         self.checker = SceneGraphCollisionChecker(
-            model=builder.Build(),
+            model=diagram,
             robot_model_instances=[arm_instance, hand_instance],
             edge_step_size=edge_step,
             env_collision_padding=padding,
