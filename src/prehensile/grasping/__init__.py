@@ -3,7 +3,7 @@
 from prehensile.grasping.candidates import Candidates, antipodal_candidates
 from prehensile.grasping.collision import boxes_overlap
 from prehensile.grasping.grasp import Grasp, GraspConfig, GraspResult, GraspStatus
-from prehensile.grasping.gripper import WSG50, ParallelGripper
+from prehensile.grasping.gripper import WSG50, HandBox, ParallelGripper
 from prehensile.grasping.scoring import Evaluation, evaluate
 from prehensile.grasping.selection import select_grasps
 
@@ -15,6 +15,7 @@ __all__ = [
     "GraspConfig",
     "GraspResult",
     "GraspStatus",
+    "HandBox",
     "ParallelGripper",
     "antipodal_candidates",
     "boxes_overlap",

@@ -17,19 +17,21 @@ class Candidates:
         R_WP: (M, 3, 3) orientations: columns are the closing axis x, the approach y, and z.
         p_WP: (M, 3) positions in W [m]; a point that is to be between the pads.
         segment: (M,) label of the piece of the cloud that is to be grasped.
+        seed: (M,) number of the place it was made for; those of one place stand together.
     """
 
     R_WP: NDArray[np.float64]
     p_WP: NDArray[np.float64]
     segment: NDArray[np.int64]
+    seed: NDArray[np.int64]
 
     def __len__(self) -> int:
         """The number of candidates."""
         return len(self.p_WP)
 
-    def select(self, index: NDArray[np.generic]) -> "Candidates":
+    def select(self, index: NDArray[np.bool_] | NDArray[np.int64]) -> "Candidates":
         """Those chosen by a mask or by indices."""
-        return Candidates(self.R_WP[index], self.p_WP[index], self.segment[index])
+        return Candidates(self.R_WP[index], self.p_WP[index], self.segment[index], self.seed[index])
 
 
 def antipodal_candidates(
@@ -59,7 +61,8 @@ def antipodal_candidates(
     # The least tilt of a direction perpendicular to n is the angle of n to the horizontal plane.
     usable = np.nonzero(np.abs(cloud.normals[:, 2]) < np.sin(config.max_tilt))[0]
     if len(usable) == 0:
-        return Candidates(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+        none = np.zeros(0, dtype=np.int64)
+        return Candidates(np.zeros((0, 3, 3)), np.zeros((0, 3)), none, none)
     _, inverse, count = np.unique(segments[usable], return_inverse=True, return_counts=True)
     weight = 1.0 / np.sqrt(count[inverse])
     seeds = rng.choice(
@@ -82,9 +85,9 @@ def antipodal_candidates(
     # A little inside the surface, so that the seed is between the pads whatever the rounding.
     inside = cloud.points[seeds] - 0.5 * config.voxel_size * cloud.normals[seeds]
     p_WP = inside[:, None, None] + depths[:, None] * y[:, :, None]
-    segment = np.broadcast_to(segments[seeds][:, None, None], (S, A, D))
+    of_seed = np.repeat(np.arange(S), A * D)
     candidates = Candidates(
-        R_WP.reshape(-1, 3, 3), p_WP.reshape(-1, 3), segment.reshape(-1).astype(np.int64)
+        R_WP.reshape(-1, 3, 3), p_WP.reshape(-1, 3), segments[seeds][of_seed], of_seed
     )
     return candidates.select(candidates.R_WP[:, 2, 1] <= -np.cos(config.max_tilt))
 

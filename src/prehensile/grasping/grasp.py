@@ -44,7 +44,7 @@ class GraspConfig:
     # horizontal distance to the object's centre (per 0.1 m),
     weight_offset: float = 0.5
     # opening (as a share of the largest),
-    weight_width: float = 0.1
+    weight_opening: float = 0.1
     # share of points between the pads that belong to another object.
     weight_mixed: float = 0.5
     # Grasps closer than this [m] and min_angle to a better one are left out; 0 or more.
@@ -109,7 +109,7 @@ class Grasp:
 
     def flipped(self) -> "Grasp":
         """The same grasp with the hand turned by half a turn about its approach axis."""
-        turn = RigidTransform(RotationMatrix.MakeYRotation(np.pi), np.zeros(3))
+        turn = RigidTransform(RotationMatrix.MakeYRotation(np.pi))
         return Grasp(self.X_WG @ turn, self.width, self.span, self.score, self.breakdown)
 
 

@@ -5,8 +5,10 @@ is the closing direction, y the approach, z lies across the fingers. The hand co
 a finger sweeps the *column* of points that are no further than its tip and within its width.
 """
 
-from collections.abc import Sequence
+import dataclasses as dc
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +49,27 @@ class Evaluation:
     terms: dict[str, NDArray[np.float64]]
     contact_axis: NDArray[np.float64]
 
+    def select(self, index: NDArray[np.int64]) -> "Evaluation":
+        """The rows chosen by indices."""
+        return self._map(lambda name, value: value[index])
+
+    def replaced(self, where: NDArray[np.bool_], other: "Evaluation") -> "Evaluation":
+        """This evaluation with the rows ``where`` (M,) taken from another of the same length."""
+
+        def choose(name: str, value: NDArray[Any]) -> NDArray[Any]:
+            new = other.terms[name] if name in other.terms else getattr(other, name)
+            return np.where(where[:, None] if value.ndim == 2 else where, new, value)
+
+        return self._map(choose)
+
+    def _map(self, f: Callable[[str, NDArray[Any]], NDArray[Any]]) -> "Evaluation":
+        """f(name, array) of every array."""
+        arrays = {x.name: getattr(self, x.name) for x in dc.fields(self) if x.name != "terms"}
+        return Evaluation(
+            **{name: f(name, value) for name, value in arrays.items()},
+            terms={name: f(name, value) for name, value in self.terms.items()},
+        )
+
 
 def evaluate(
     candidates: Candidates,
@@ -62,7 +85,7 @@ def evaluate(
     finger, within the largest opening; if the contacts are antipodal; and if neither hand nor
     wrist, swept along the approach, touch the cloud or an obstacle. Its score is
 
-        contact quality - tilt - offset - width - mixed
+        contact quality - tilt - offset - opening - mixed
 
     with the weights of the config. The contact quality is the mean of both sides' own: of the
     points that a pad touches first, the sum of the squared x components of the normals (those
@@ -71,8 +94,7 @@ def evaluate(
     judged apart.
 
     Args:
-        candidates: poses between the pads, in W; neighbours in the list should be neighbours in
-            space, for speed.
+        candidates: poses between the pads, in W.
         cloud: the scene in W.
         segments: (N,) labels of its points.
         gripper: the hand.
@@ -84,35 +106,38 @@ def evaluate(
     """
     M = len(candidates)
     out = Evaluation(
-        status=np.full(M, GraspStatus.NO_POINTS, dtype=object),
+        status=np.full(M, GraspStatus.FOUND, dtype=object),
         p_WP=candidates.p_WP.copy(),
         width=np.zeros(M),
         span=np.zeros(M),
         score=np.full(M, -np.inf),
-        terms={name: np.zeros(M) for name in ("contact", "tilt", "offset", "width", "mixed")},
+        terms={name: np.zeros(M) for name in ("contact", "tilt", "offset", "opening", "mixed")},
         contact_axis=np.zeros((M, 3)),
     )
     centres = _segment_centres(cloud, segments)
-    chunk = 32
-    for start in range(0, M, chunk):
-        rows = slice(start, min(start + chunk, M))
+    for rows in _places(candidates.seed):
         _evaluate_columns(candidates, rows, cloud, segments, centres, gripper, config, out)
     alive = np.nonzero(out.status == GraspStatus.FOUND)[0]
     if len(obstacles) > 0 and len(alive) > 0:
         hits = _hits_obstacles(candidates.R_WP, out, alive, gripper, obstacles, config)
         out.status[alive[hits]] = GraspStatus.HITS_OBSTACLES
         alive = alive[~hits]
-    for start in range(0, len(alive), chunk):
-        rows = alive[start : start + chunk]
+    for rows in _places(candidates.seed, alive):
         hits = _hand_hits_cloud(candidates.R_WP, out, rows, cloud, gripper, config)
         out.status[rows[hits]] = GraspStatus.HITS_CLOUD
     out.score[out.status != GraspStatus.FOUND] = -np.inf
     return out
 
 
-def _segment_centres(
-    cloud: Cloud, segments: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _places(
+    seed: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> list[NDArray[np.int64]]:
+    """The rows (by default all), divided into those of one seed, which lie near each other."""
+    rows = np.arange(len(seed)) if rows is None else rows
+    return np.split(rows, np.nonzero(np.diff(seed[rows]))[0] + 1) if len(rows) else []
+
+
+def _segment_centres(cloud: Cloud, segments: NDArray[np.int64]) -> NDArray[np.float64]:
     """(L, 3) the mean point of each label 0..L-1."""
     labelled = segments >= 0
     if not labelled.any():
@@ -124,7 +149,7 @@ def _segment_centres(
 
 def _evaluate_columns(
     candidates: Candidates,
-    rows: slice,
+    rows: NDArray[np.int64],
     cloud: Cloud,
     segments: NDArray[np.int64],
     centres: NDArray[np.float64],
@@ -132,168 +157,176 @@ def _evaluate_columns(
     config: GraspConfig,
     out: Evaluation,
 ) -> None:
-    """Everything that the columns of the fingers tell, for the candidates in ``rows``."""
+    """Everything that the columns of the fingers tell about the candidates ``rows``."""
     R, p = candidates.R_WP[rows], candidates.p_WP[rows]
-    m = len(p)
-    p_Pad = gripper.p_GPad[1]
-    tip, palm = gripper.pad_y[1] - p_Pad, gripper.palm_y[1] - p_Pad
+    m = len(rows)
+    tip = gripper.pad_y[1] - gripper.p_GPad[1]
+    base = gripper.finger[0].y[0] - gripper.p_GPad[1]
     room = gripper.finger_thickness + 2 * config.clearance
     reach = gripper.max_gap + room
-    half_z = 0.5 * gripper.finger_width + config.margin
+    half_z = 0.5 * gripper.finger[0].width + config.margin
+    near, x, y, z = _local(cloud.points, R, p, np.hypot(reach, max(-base, tip)))
+    i, n = np.nonzero(
+        (np.abs(z) <= half_z) & (y <= tip + config.margin) & (y >= base) & (np.abs(x) <= reach)
+    )
+    x, y, z, n = x[i, n].astype(float), y[i, n], z[i, n], near[n]
 
-    middle = p.mean(axis=0)
-    radius = np.sqrt(reach**2 + max(-palm, tip) ** 2) + np.linalg.norm(p - middle, axis=1).max()
-    near = np.nonzero(np.sum((cloud.points - middle) ** 2, axis=1) < radius**2)[0]
-    if len(near) == 0:
-        return
-    # Coordinates of every near point in every candidate's frame: three (m, n) arrays.
-    q = cloud.points[near] - middle
-    shift = np.einsum("mik,mi->mk", R, p - middle)
-    z = _dot(R[:, :, 2], q) - shift[:, 2:]
-    i, n = np.nonzero(np.abs(z) <= half_z)
-    y = np.einsum("ki,ki->k", R[i, :, 1], q[n]) - shift[i, 1]
-    x = np.einsum("ki,ki->k", R[i, :, 0], q[n]) - shift[i, 0]
-    z = z[i, n]
-    column = (y <= tip + config.margin) & (y >= palm) & (np.abs(x) <= reach)
-    i, n, x, y, z = i[column], n[column], x[column], y[column], z[column]
+    x_left, x_right = _room_beside(i, x, m, room, reach)
+    between = (x > x_left[i]) & (x < x_right[i])
+    low = -_largest(i[between], -x[between], m)
+    high = _largest(i[between], x[between], m)
+    wide = ~np.isfinite(x_left) | ~np.isfinite(x_right) | ~np.isfinite(low)
 
-    # Room for a finger: the first stretch of free cells to the right and to the left of x = 0.
-    half_cells = int(np.ceil(reach / _CELL))
-    cells = 2 * half_cells + 1
-    cell = np.floor(x / _CELL + 0.5).astype(np.int64) + half_cells
-    taken = np.zeros((m, cells + 1), dtype=np.int64)
-    np.add.at(taken, (i, cell + 1), 1)
-    before = np.cumsum(taken, axis=1)  # before[:, b]: points in cells 0..b-1
-    need = int(np.ceil(room / _CELL))
-    stretch_free = before[:, need:] == before[:, :-need]  # cells b..b+need-1
-    right = stretch_free[:, half_cells:]
-    left = stretch_free[:, : half_cells - need + 1][:, ::-1]
-    has_room = right.any(axis=1) & left.any(axis=1)
-    # What is between lies strictly within these edges of cells.
-    x_right = (np.argmax(right, axis=1) - 0.5) * _CELL
-    x_left = -(np.argmax(left, axis=1) + 0.5) * _CELL
-
-    between = has_room[i] & (x < x_right[i]) & (x > x_left[i])
-    i, n, x, y, z = i[between], n[between], x[between], y[between], z[between]
-    high = _extreme(np.maximum, i, x, m)
-    low = -_extreme(np.maximum, i, -x, m)
-    # What the pads will touch: they close evenly, so the hand is centred on that.
+    # The pads close evenly, so the hand is centred on what they will touch; a side that no camera
+    # saw is taken to be where the column ends.
     pad_half = 0.5 * (gripper.pad_y[1] - gripper.pad_y[0])
-    at_pads = (np.abs(y) <= pad_half) & (np.abs(z) <= 0.5 * gripper.pad_width)
-    ip, np_, xp = i[at_pads], n[at_pads], x[at_pads]
-    pad_high = _extreme(np.maximum, ip, xp, m)
-    pad_low = -_extreme(np.maximum, ip, -xp, m)
-    normal_x = np.einsum("ki,ki->k", R[ip, :, 0], cloud.normals[near[np_]])
-    toward_right = _extreme(np.maximum, ip, np.where(normal_x > 0, xp, -np.inf), m)
-    toward_left = -_extreme(np.maximum, ip, np.where(normal_x < 0, -xp, -np.inf), m)
-    # A side that no camera saw is taken to be where the column ends.
-    seen_right, seen_left = np.isfinite(toward_right), np.isfinite(toward_left)
-    high_touch = np.where(seen_right, pad_high, high)
-    low_touch = np.where(seen_left, pad_low, low)
+    at_pads = between & (np.abs(y) <= pad_half) & (np.abs(z) <= 0.5 * gripper.pad_width)
+    k, n_pad, x_pad = i[at_pads], n[at_pads], x[at_pads]
+    normals = cloud.normals[n_pad]
+    normal_x = np.sum(R[k, :, 0] * normals, axis=1)
+    touch, seen = {}, {}
+    for sign, end in ((-1, -low), (1, high)):
+        faces = sign * normal_x > 0
+        seen[sign] = np.bincount(k[faces], minlength=m) > 0
+        touch[sign] = np.where(seen[sign], _largest(k, sign * x_pad, m), end)
     with np.errstate(invalid="ignore"):
-        centre = 0.5 * (high_touch + low_touch)
-        half_gap = np.maximum(high - centre, centre - low) + config.clearance
-        # The column's neighbours may still be too near for a finger on the wider side.
-        slack = np.minimum(x_right - high, low - x_left) + room - config.clearance
-        fits = half_gap + gripper.finger_thickness <= np.minimum(
-            high - centre, centre - low
-        ) + np.maximum(slack, room - config.clearance)
-        wide = ~has_room | (2 * half_gap > gripper.max_gap)
-        span = high_touch - low_touch
+        centre = 0.5 * (touch[1] - touch[-1])
+        span = touch[1] + touch[-1]
+        extent = np.maximum(high - centre, centre - low)
+    half_gap = np.minimum(extent + config.clearance, 0.5 * gripper.max_gap)
+    wide |= ~(half_gap - extent >= 0.5 * config.clearance)
+    outward = np.abs(x - centre[i]) - half_gap[i]
+    blocked = (outward >= 0) & (outward <= gripper.finger_thickness + config.margin)
+    hits = np.bincount(i[blocked], minlength=m) > 0
 
-    # Quality of the contact of each side.
     full = 0.5 * gripper.pad_width * 2 * pad_half / config.voxel_size**2
-    quality, contact_axis = np.zeros(m), np.zeros((m, 3))
-    square_ok = np.ones(m, dtype=bool)
-    for sign, edge, seen in ((1.0, pad_high, seen_right), (-1.0, -pad_low, seen_left)):
-        touched = sign * xp >= edge[ip] - config.contact_depth
-        k = ip[touched]
-        facing = np.maximum(sign * normal_x[touched], 0.0) ** 2
-        total = np.bincount(k, facing, m)
-        mean = total / np.maximum(np.bincount(k, minlength=m), 1)
-        quality += 0.5 * np.where(
-            seen, np.minimum(total / full, 1.0) * mean, config.unseen_side
-        )
-        square_ok &= ~seen | (mean >= np.cos(config.max_contact_angle) ** 2)
+    quality, square, contact_axis = np.zeros(m), np.ones(m, dtype=bool), np.zeros((m, 3))
+    for sign in (-1, 1):
+        first = sign * x_pad >= touch[sign][k] - config.contact_depth
+        facing = np.maximum(sign * normal_x[first], 0.0) ** 2
+        total = np.bincount(k[first], facing, m)
+        mean = total / np.maximum(np.bincount(k[first], minlength=m), 1)
+        seen_quality = np.minimum(total / full, 1.0) * mean
+        quality += 0.5 * np.where(seen[sign], seen_quality, config.unseen_side)
+        square &= ~seen[sign] | (mean >= np.cos(config.max_contact_angle) ** 2)
         for axis in range(3):
-            contact_axis[:, axis] += np.bincount(
-                k, facing * sign * cloud.normals[near[np_[touched]], axis], m
-            )
-    both = seen_right & seen_left
-    antipodal = square_ok & (both | ((seen_right | seen_left) & (span > _MIN_UNSEEN_SPAN)))
+            contact_axis[:, axis] += np.bincount(k[first], facing * sign * normals[first, axis], m)
+    length = np.linalg.norm(contact_axis, axis=1, keepdims=True)
+    out.contact_axis[rows] = contact_axis / np.maximum(length, 1e-12)
+    both, one = seen[-1] & seen[1], seen[-1] | seen[1]
+    antipodal = square & (both | (one & (span > _MIN_UNSEEN_SPAN)))
+
+    # Later lines take precedence.
+    status = np.full(m, GraspStatus.FOUND, dtype=object)
+    status[hits] = GraspStatus.HITS_CLOUD
+    status[~antipodal] = GraspStatus.NOT_ANTIPODAL
+    status[wide] = GraspStatus.TOO_WIDE
+    out.status[rows] = status
+    out.p_WP[rows] = p + np.where(wide, 0.0, centre)[:, None] * R[:, :, 0]
+    out.span[rows] = np.where(wide, 0.0, span)
+    out.width[rows] = np.where(wide, 0.0, 2 * (half_gap - gripper.pad_offset))
 
     label = candidates.segment[rows]
-    other = segments[near[np_]] != label[ip]
-    mixed = np.bincount(ip, other, m) / np.maximum(np.bincount(ip, minlength=m), 1)
-
-    status = np.full(m, GraspStatus.FOUND, dtype=object)
-    status[~antipodal] = GraspStatus.NOT_ANTIPODAL
-    status[~fits & antipodal] = GraspStatus.HITS_CLOUD
-    status[wide] = GraspStatus.TOO_WIDE
-    status[~np.isfinite(high)] = np.where(
-        has_room[~np.isfinite(high)], GraspStatus.NO_POINTS, GraspStatus.TOO_WIDE
-    )
-    found = status == GraspStatus.FOUND
-    out.status[rows] = status
-    with np.errstate(invalid="ignore"):
-        out.p_WP[rows] = np.where(found[:, None], p + centre[:, None] * R[:, :, 0], p)
-        out.width[rows] = np.where(found, 2 * half_gap - 2 * gripper.pad_offset, 0.0)
-        out.width[rows] = np.clip(out.width[rows], 0.0, gripper.max_width)
-        out.span[rows] = np.where(found, span, 0.0)
-    length = np.linalg.norm(contact_axis, axis=1, keepdims=True)
-    out.contact_axis[rows] = np.where(length > 0, contact_axis / np.maximum(length, 1e-12), 0.0)
-    offset = np.zeros(m)
+    other = np.bincount(k, segments[n_pad] != label[k], m)
+    arm = np.zeros(m)
     known = label >= 0
-    offset[known] = np.linalg.norm(
-        (out.p_WP[rows][known] - centres[label[known]])[:, :2], axis=1
-    )
+    arm[known] = np.linalg.norm((out.p_WP[rows] - centres[label])[known, :2], axis=1)
     terms = {
         "contact": quality,
         "tilt": -config.weight_tilt * (1.0 + R[:, 2, 1]),
-        "offset": -config.weight_offset * offset / 0.1,
-        "width": -config.weight_width * out.width[rows] / gripper.max_width,
-        "mixed": -config.weight_mixed * mixed,
+        "offset": -config.weight_offset * arm / 0.1,
+        "opening": -config.weight_opening * out.width[rows] / gripper.max_width,
+        "mixed": -config.weight_mixed * other / np.maximum(np.bincount(k, minlength=m), 1),
     }
     for name, term in terms.items():
         out.terms[name][rows] = term
     out.score[rows] = sum(terms.values())
 
 
-def _dot(axes: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, n) products of every axis (m, 3) with every point (n, 3)."""
-    return sum(axes[:, k, None] * q[None, :, k] for k in range(3))
+def _room_beside(
+    i: NDArray[np.int64], x: NDArray[np.float64], m: int, room: float, reach: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the first stretches of length ``room`` without points begin, left and right of x = 0.
+
+    Args:
+        i: (P,) which column a point is in, 0..m-1.
+        x: (P,) its coordinate, at most ``reach`` in absolute value.
+        m: number of columns.
+        room: length [m].
+        reach: how far to look [m].
+
+    Returns:
+        (m,) their inner ends left (negative) and right, nan where there is no such stretch.
+    """
+    half = int(np.ceil(reach / _CELL))
+    need = int(np.ceil(room / _CELL))
+    taken = np.zeros((m, 2 * half + 2), dtype=np.int64)
+    np.add.at(taken, (i, np.floor(x / _CELL + 0.5).astype(np.int64) + half + 1), 1)
+    before = np.cumsum(taken, axis=1)  # before[:, b]: points in cells 0 to b-1
+    free = before[:, need:] == before[:, :-need]  # whether cells b to b+need-1 are free
+    right, left = free[:, half:], free[:, : half - need + 1][:, ::-1]
+    x_right = (np.argmax(right, axis=1) - 0.5) * _CELL
+    x_left = -(np.argmax(left, axis=1) + 0.5) * _CELL
+    return (
+        np.where(left.any(axis=1), x_left, np.nan),
+        np.where(right.any(axis=1), x_right, np.nan),
+    )
 
 
-def _extreme(
-    ufunc: np.ufunc, index: NDArray[np.int64], values: NDArray[np.float64], m: int
-) -> NDArray[np.float64]:
+def _local(
+    points: NDArray[np.float64], R: NDArray[np.float64], p: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Coordinates of the points near any of the frames (R, p), in every one of them.
+
+    Returns:
+        The indices (n,) of all points within ``radius`` of any of the frames' origins (and some
+        further ones), and their x, y and z, each (m, n). Single precision: it is relative to a
+        point nearby.
+    """
+    middle = p.mean(axis=0)
+    limit = radius + np.linalg.norm(p - middle, axis=1).max()
+    q = points - middle
+    near = np.nonzero(np.einsum("nk,nk->n", q, q) <= limit**2)[0]
+    q = q[near].astype(np.float32)
+    shift = np.einsum("mik,mi->km", R, p - middle).astype(np.float32)
+    axes = R.astype(np.float32)
+    x, y, z = (
+        axes[:, 0, k, None] * q[:, 0]
+        + axes[:, 1, k, None] * q[:, 1]
+        + (axes[:, 2, k, None] * q[:, 2] - shift[k, :, None])
+        for k in range(3)
+    )
+    return near, x, y, z
+
+
+def _largest(index: NDArray[np.int64], values: NDArray[np.float64], m: int) -> NDArray[np.float64]:
     """(m,) largest of the values of each index; -inf where there is none."""
     result = np.full(m, -np.inf)
-    ufunc.at(result, index, values)
+    np.maximum.at(result, index, values)
     return result
 
 
 def _hits_obstacles(
     R_WP: NDArray[np.float64],
     out: Evaluation,
-    alive: NDArray[np.int64],
+    rows: NDArray[np.int64],
     gripper: ParallelGripper,
     obstacles: Sequence[Box],
     config: GraspConfig,
 ) -> NDArray[np.bool_]:
-    """Which of the candidates ``alive`` touch an obstacle on the way in or at the end."""
-    R = R_WP[alive]
-    p_WG = out.p_WP[alive] - np.einsum("mij,j->mi", R, gripper.p_GPad)
-    centres_G, sizes = gripper.boxes(out.width[alive], config.approach)
+    """Which of the candidates ``rows`` touch an obstacle on the way in or at the end."""
+    R = R_WP[rows]
+    p_WG = out.p_WP[rows] - R @ gripper.p_GPad
+    centres_G, sizes = gripper.boxes(out.width[rows], config.approach)
     centres = p_WG[:, None] + np.einsum("mij,mbj->mbi", R, centres_G)
-    hits = np.zeros(len(alive), dtype=bool)
+    hits = np.zeros(len(rows), dtype=bool)
     for X_WB, size in obstacles:
         overlap = boxes_overlap(
             R[:, None],
             centres,
             sizes + 2 * config.obstacle_margin,
-            X_WB.rotation().matrix(),
-            X_WB.translation(),
+            np.asarray(X_WB.rotation().matrix(), dtype=float),
+            np.asarray(X_WB.translation(), dtype=float),
             np.asarray(size, dtype=float),
         )
         hits |= overlap.any(axis=1)
@@ -310,28 +343,24 @@ def _hand_hits_cloud(
 ) -> NDArray[np.bool_]:
     """Which of the candidates ``rows`` have points in the hand, or above it on its way in."""
     R, p = R_WP[rows], out.p_WP[rows]
-    q = cloud.points - p.mean(axis=0)
-    shift = np.einsum("mik,mi->mk", R, p - p.mean(axis=0))
-    x, y, z = (np.abs(_dot(R[:, :, k], q) - shift[:, k : k + 1]) if k != 1
-               else _dot(R[:, :, 1], q) - shift[:, 1:2] for k in range(3))
-    y = y + gripper.p_GPad[1]  # now from G's origin
+    # These parts lie behind the pads: most of the scene is below them, if the hand points down.
+    behind = gripper.p_GPad[1] - max(part.y[1] for part in gripper.finger[1:] + gripper.body)
+    beside = max(part.x[1] for part in gripper.finger[1:] + gripper.body) + 0.5 * gripper.max_width
+    lowest = p[:, 2] - behind * R[:, 2, 1] - beside * np.hypot(R[:, 2, 0], R[:, 2, 2])
+    above = cloud.points[:, 2] >= lowest.min() - 2 * config.margin
+    _, x, y, z = _local(cloud.points[above], R, p, 0.25)
+    y += np.float32(gripper.p_GPad[1])  # from G's origin
+    np.abs(x, out=x)
+    np.abs(z, out=z)
     hits = np.zeros(len(rows), dtype=bool)
-    for (size_x, size_z), end in (
-        (gripper.palm_size, gripper.palm_y[1]),
-        (gripper.wrist_size, gripper.wrist_y[1]),
-    ):
-        inside = (
-            (y <= end + config.margin)
-            & (x <= 0.5 * size_x + config.margin)
-            & (z <= 0.5 * size_z + config.margin)
-        )
-        hits |= inside.any(axis=1)
-    # The fingers, for points that the columns did not reach.
-    inner = 0.5 * out.width[rows] + gripper.pad_offset
-    fingers = (
-        (y <= gripper.pad_y[1] + config.margin)
-        & (z <= 0.5 * gripper.finger_width + config.margin)
-        & (x >= inner[:, None])
-        & (x <= inner[:, None] + gripper.finger_thickness + config.margin)
-    )
-    return hits | fingers.any(axis=1)
+    half_width = 0.5 * out.width[rows, None].astype(np.float32)
+    for parts, shift in ((gripper.finger[1:], half_width), (gripper.body, 0 * half_width)):
+        for part in parts:
+            inside = (
+                (y <= part.y[1] + config.margin)
+                & (z <= 0.5 * part.width + config.margin)
+                & (x - shift >= part.x[0] - config.margin)
+                & (x - shift <= part.x[1] + config.margin)
+            )
+            hits |= inside.any(axis=1)
+    return hits

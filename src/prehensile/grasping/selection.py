@@ -1,5 +1,6 @@
 """The choice of grasps in a scene."""
 
+import dataclasses as dc
 from collections import Counter
 from collections.abc import Sequence
 
@@ -51,76 +52,67 @@ def select_grasps(
     if len(candidates) == 0:
         return GraspResult(GraspStatus.NO_SIDES)
     first = evaluate(candidates, cloud, segments, gripper, obstacles, config)
-    best = np.argsort(-first.score, kind="stable")[: 8 * config.max_grasps]
-    best = best[np.isfinite(first.score[best])]
-    turned = _aligned(candidates, first, best, config)
-    second = evaluate(turned, cloud, segments, gripper, obstacles, config)
-
     counts = Counter(first.status)
-    grasps = _distinct(
-        _as_grasps(candidates, first, gripper) + _as_grasps(turned, second, gripper), config
+    best = _distinct(candidates, first, config)
+    candidates, first = candidates.select(best), first.select(best)
+    turned = _aligned(candidates, first)
+    second = evaluate(turned, cloud, segments, gripper, obstacles, config)
+    second.score[turned.R_WP[:, 2, 1] > -np.cos(config.max_tilt)] = -np.inf
+
+    better = second.score > first.score
+    R_WP = np.where(better[:, None, None], turned.R_WP, candidates.R_WP)
+    final = first.replaced(better, second)
+    grasps = tuple(
+        _as_grasp(R_WP[k], final, k, gripper)
+        for k in _distinct(dc.replace(candidates, R_WP=R_WP), final, config)
     )
     if grasps:
         return GraspResult(GraspStatus.FOUND, grasps, counts)
     return GraspResult(counts.most_common(1)[0][0], (), counts)
 
 
-def _aligned(
-    candidates: Candidates,
-    evaluation: Evaluation,
-    rows: NDArray[np.int64],
-    config: GraspConfig,
-) -> Candidates:
-    """The candidates ``rows``, turned to close along their mean contact normal."""
-    x = evaluation.contact_axis[rows]
-    ok = np.abs(x[:, 2]) < np.sin(config.max_tilt)
-    rows, x = rows[ok], x[ok]
-    # Keep the approach: of all y perpendicular to the new x, the one nearest to the old y.
-    y = candidates.R_WP[rows, :, 1]
+def _aligned(candidates: Candidates, evaluation: Evaluation) -> Candidates:
+    """The candidates, turned to close along their mean contact normals, where they were centred.
+
+    Of all approaches perpendicular to the new closing axis each takes the one nearest to its own.
+    """
+    x, y = evaluation.contact_axis, candidates.R_WP[:, :, 1]
     y = y - np.sum(x * y, axis=1, keepdims=True) * x
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    y = y / np.linalg.norm(y, axis=1, keepdims=True)
     R_WP = np.stack([x, y, np.cross(x, y)], axis=-1)
-    turned = Candidates(R_WP, evaluation.p_WP[rows], candidates.segment[rows])
-    return turned.select(R_WP[:, 2, 1] <= -np.cos(config.max_tilt))
+    return dc.replace(candidates, R_WP=R_WP, p_WP=evaluation.p_WP, seed=np.arange(len(candidates)))
 
 
-def _as_grasps(
-    candidates: Candidates, evaluation: Evaluation, gripper: ParallelGripper
-) -> list[Grasp]:
-    """The feasible candidates as grasps."""
-    grasps = []
-    for k in np.nonzero(np.isfinite(evaluation.score))[0]:
-        R = candidates.R_WP[k]
-        grasps.append(
-            Grasp(
-                RigidTransform(
-                    RotationMatrix(R), evaluation.p_WP[k] - R @ gripper.p_GPad
-                ),
-                float(evaluation.width[k]),
-                float(evaluation.span[k]),
-                float(evaluation.score[k]),
-                {name: float(term[k]) for name, term in evaluation.terms.items()},
-            )
-        )
-    return grasps
+def _distinct(
+    candidates: Candidates, evaluation: Evaluation, config: GraspConfig
+) -> NDArray[np.int64]:
+    """Indices of the best feasible candidates, best first, none near a better one.
+
+    Half a turn of the hand about its approach is no difference.
+    """
+    left = np.argsort(-evaluation.score, kind="stable")
+    left = left[np.isfinite(evaluation.score[left])]
+    kept = []
+    while len(left) > 0 and len(kept) < config.max_grasps:
+        best, left = left[0], left[1:]
+        kept.append(best)
+        distance = np.linalg.norm(evaluation.p_WP[left] - evaluation.p_WP[best], axis=1)
+        # The diagonal of R_best^T R; half a turn about y flips its first and last entries.
+        d = np.sum(candidates.R_WP[best] * candidates.R_WP[left], axis=1)
+        trace = d[:, 1] + np.abs(d[:, 0] + d[:, 2])
+        alike = (distance < config.min_distance) & (0.5 * (trace - 1.0) > np.cos(config.min_angle))
+        left = left[~alike]
+    return np.array(kept, dtype=np.int64)
 
 
-def _distinct(grasps: list[Grasp], config: GraspConfig) -> tuple[Grasp, ...]:
-    """The best grasps, none near a better one; half a turn of the hand is no difference."""
-    kept: list[Grasp] = []
-    for grasp in sorted(grasps, key=lambda g: -g.score):
-        if len(kept) == config.max_grasps:
-            break
-        if not any(_alike(grasp, other, config) for other in kept):
-            kept.append(grasp)
-    return tuple(kept)
-
-
-def _alike(a: Grasp, b: Grasp, config: GraspConfig) -> bool:
-    """Whether two grasps are near each other in place and orientation."""
-    if np.linalg.norm(a.X_WG.translation() - b.X_WG.translation()) >= config.min_distance:
-        return False
-    R_AB = a.X_WG.rotation().matrix().T @ b.X_WG.rotation().matrix()
-    # tr(R diag(-1, 1, -1)) is the trace after half a turn about y.
-    trace = max(np.trace(R_AB), R_AB[1, 1] - R_AB[0, 0] - R_AB[2, 2])
-    return bool(0.5 * (trace - 1.0) > np.cos(config.min_angle))
+def _as_grasp(
+    R_WP: NDArray[np.float64], evaluation: Evaluation, k: int, gripper: ParallelGripper
+) -> Grasp:
+    """Row k of the evaluation as a grasp."""
+    return Grasp(
+        X_WG=RigidTransform(RotationMatrix(R_WP), evaluation.p_WP[k] - R_WP @ gripper.p_GPad),
+        width=float(evaluation.width[k]),
+        span=float(evaluation.span[k]),
+        score=float(evaluation.score[k]),
+        breakdown={name: float(term[k]) for name, term in evaluation.terms.items()},
+    )

@@ -2,7 +2,7 @@
 
 from prehensile.perception.cloud import Box, Cloud, crop, inside_box
 from prehensile.perception.depth import normals_from_depth, unproject
-from prehensile.perception.fusion import fuse_depth_images, voxel_downsample
+from prehensile.perception.fusion import downsample, fuse_depth_images
 from prehensile.perception.segmentation import convex_segments
 
 __all__ = [
@@ -10,9 +10,9 @@ __all__ = [
     "Cloud",
     "convex_segments",
     "crop",
+    "downsample",
     "fuse_depth_images",
     "inside_box",
     "normals_from_depth",
     "unproject",
-    "voxel_downsample",
 ]

@@ -29,12 +29,10 @@ class Cloud:
     Attributes:
         points: (N, 3) positions [m].
         normals: (N, 3) unit normals, pointing out of the surface.
-        rgb: (N, 3) colours in 0..1, or None.
     """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
-    rgb: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         """Checks shapes and finiteness.
@@ -43,8 +41,6 @@ class Cloud:
             InputError: if the shapes disagree or a value is not finite.
         """
         fields = {"points": self.points, "normals": self.normals}
-        if self.rgb is not None:
-            fields["rgb"] = self.rgb
         faults = [
             f"{name} has shape {value.shape}; expected ({len(self.points)}, 3)"
             for name, value in fields.items()
@@ -61,20 +57,14 @@ class Cloud:
         """The number of points."""
         return len(self.points)
 
-    def select(self, index: NDArray[np.generic]) -> "Cloud":
+    def select(self, index: NDArray[np.bool_] | NDArray[np.int64]) -> "Cloud":
         """The cloud of the points chosen by a mask (N,) or by indices (M,)."""
-        return Cloud(
-            self.points[index],
-            self.normals[index],
-            None if self.rgb is None else self.rgb[index],
-        )
+        return Cloud(self.points[index], self.normals[index])
 
     def transformed(self, X_AB: RigidTransform) -> "Cloud":
         """This cloud, given in B, expressed in A."""
-        R_AB = X_AB.rotation().matrix()
-        return Cloud(
-            rotate(self.points, R_AB) + X_AB.translation(), rotate(self.normals, R_AB), self.rgb
-        )
+        R_AB = np.asarray(X_AB.rotation().matrix(), dtype=float)
+        return Cloud(rotate(self.points, R_AB) + X_AB.translation(), rotate(self.normals, R_AB))
 
 
 def rotate(vectors: NDArray[np.floating], R: NDArray[np.floating]) -> NDArray[np.float64]:

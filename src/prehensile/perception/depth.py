@@ -81,7 +81,7 @@ def normals_from_depth(
     x, y = _ray_slopes(z.shape, K)
     H, W = z.shape
     normals = np.full((H, W, 3), np.nan)
-    if H < window or W < window:
+    if min(H, W) < window:
         return normals
     w = 1.0 / z  # NaN spreads through the sums to every window that contains it
 
@@ -158,7 +158,9 @@ def _ray_slopes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """x/z of each column (1, W) and y/z of each row (H, 1) of the lines of sight."""
     if K.shape != (3, 3) or not np.isfinite(K).all() or K[0, 0] <= 0 or K[1, 1] <= 0:
-        raise InputError("K is not a (3, 3) matrix of pinhole intrinsics with positive focal length")
+        raise InputError(
+            "K is not a (3, 3) matrix of pinhole intrinsics with positive focal length"
+        )
     if K[0, 1] != 0 or K[1, 0] != 0 or not np.array_equal(K[2], [0, 0, 1]):
         raise InputError("K has skew or a last row other than [0, 0, 1]; rectify the image first")
     x = (np.arange(shape[1])[None, :] - K[0, 2]) / K[0, 0]
