@@ -1,0 +1,98 @@
+"""Collision geometry of the objects: few shapes, cheap, and still at rest.
+
+The hulls (boxes, cylinders, capsules) are rigid hydroelastic, for the grip of compliant fingers.
+Between two rigid bodies Drake falls back to point contact, and that has one point for each pair of
+shapes: a box on a table would stand on one point that jumps. So the objects stand on small balls
+at their corners and rims. The hulls are drawn in a little behind the surface of the balls, so that
+on a plane the balls carry alone.
+
+A round can lies on its balls like a prism, which keeps it from rolling about for ever: Drake has
+no rolling friction. Its hull is drawn in to that prism.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from prehensile.models.generate.sdf_model import Collision, Contact, Pose, Shape
+
+BALL = 0.001  # m, radius of the balls at corners and rims
+INSET = 0.0003  # m, from the surface of the balls to that of the hulls
+_PI = np.pi
+
+
+def surface(mu: float = 0.6, resolution: float = 0.01) -> Contact:
+    """A dry rigid surface; ``resolution`` is the edge length of curved hulls' meshes, m."""
+    return Contact(mu=mu, hydroelastic="rigid", resolution=resolution, relaxation_time=0.02)
+
+
+def hull(name: str, kind: str, size: Sequence[float], pose: Sequence[float] = (), **contact: float) -> Collision:
+    """A hull; the pose may stop at any number of its six values, the rest being zero."""
+    full = tuple(float(v) for v in pose) + (0.0,) * (6 - len(pose))
+    place: Pose = (full[0], full[1], full[2], full[3], full[4], full[5])
+    return Collision(name, Shape(kind, tuple(float(v) for v in size)), place, surface(**contact))
+
+
+def balls(points: ArrayLike, *, start: int = 0, radius: float = BALL, **contact: float) -> list[Collision]:
+    """Balls with their centres at the points (N, 3)."""
+    return [
+        hull(f"ball_{start + k}", "sphere", [radius], point, resolution=radius, **contact)
+        for k, point in enumerate(np.asarray(points, dtype=float).reshape(-1, 3))
+    ]
+
+
+def box_collisions(size: ArrayLike, **contact: float) -> list[Collision]:
+    """A box about the origin on eight balls."""
+    extents = np.asarray(size, dtype=float)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return [
+        hull("hull", "box", extents - 2.0 * INSET, **contact),
+        *balls(signs * (extents / 2.0 - BALL), **contact),
+    ]
+
+
+def ring(radius: float, count: int, z: float, phase: float = 0.0) -> np.ndarray:
+    """(count, 3) centres of balls whose surfaces touch the circle of the given radius.
+
+    ``z`` is the height of the plane that the balls touch with their far side from z = 0.
+    """
+    angle = phase + 2.0 * _PI * np.arange(count) / count
+    level = z - np.sign(z) * BALL
+    return np.column_stack(
+        [
+            (radius - BALL) * np.cos(angle),
+            (radius - BALL) * np.sin(angle),
+            np.full(count, level),
+        ]
+    )
+
+
+def can_collisions(radius: float, height: float, count: int = 12, **contact: float) -> list[Collision]:
+    """An upright can about the origin on two rings of ``count`` balls."""
+    # Inscribed in the prism that the balls span, so that the can does not roll.
+    flat = (radius - BALL) * np.cos(_PI / count) + BALL
+    return [
+        hull("hull", "cylinder", [flat - INSET, height - 2.0 * INSET], **contact),
+        *balls(ring(radius, count, -0.5 * height), **contact),
+        *balls(ring(radius, count, 0.5 * height), start=count, **contact),
+    ]
+
+
+def octagon(a: float, b: float, flat_a: float, flat_b: float, z: float) -> np.ndarray:
+    """(8, 3) centres of balls at the corners of an octagon with sides along x and y.
+
+    Args:
+        a: half extent along x; b along y (outside of the balls).
+        flat_a: half length of the sides along x (outside of the balls); flat_b along y.
+        b: see a.
+        flat_b: see flat_a.
+        z: height of the plane that the balls touch with their far side from z = 0.
+    """
+    inner = [
+        (sx * (u - BALL), sy * (w - BALL), z - np.sign(z) * BALL)
+        for u, w in ((a, flat_b), (flat_a, b))
+        for sx in (-1.0, 1.0)
+        for sy in (-1.0, 1.0)
+    ]
+    return np.array(inner)
