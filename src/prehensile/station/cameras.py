@@ -1,0 +1,258 @@
+"""Depth cameras whose images are rendered when they are read, and not before.
+
+Frames: W world, P the frame a camera is attached to, B its body, C its optical frame (z forward,
+x right and y down in the image), which is that of its depth sensor.
+"""
+
+import os
+import warnings
+from copy import deepcopy
+from typing import NoReturn
+
+from pydrake.common.schema import Transform
+from pydrake.geometry import (
+    MakeRenderEngineGl,
+    MakeRenderEngineGltfClient,
+    MakeRenderEngineVtk,
+    RenderEngine,
+    RenderEngineGlParams,
+    RenderEngineGltfClientParams,
+    RenderEngineVtkParams,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import GetScopedFrameByName
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.perception import BaseField, DepthImageToPointCloud
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.sensors import CameraConfig, PixelType, RgbdSensor
+
+from prehensile.errors import Finding, InputError
+from prehensile.station.scenario import Scenario
+
+
+def d415_camera_config(
+    name: str,
+    X_PC: RigidTransform,
+    *,
+    base_frame: str = "",
+    width: int = 640,
+    height: int = 480,
+    renderer_name: str = "default",
+) -> CameraConfig:
+    """Settings of a camera like Intel's RealSense D415, depth aligned to colour.
+
+    Its colour sensor sees 42.5 degrees from top to bottom with square pixels (a focal length of
+    617 pixels at 480 lines), and depth begins at 0.3 m (Intel RealSense D400 series data sheet,
+    337029, sections 3 and 4).
+
+    Args:
+        name: the camera's name, first part of its ports' names.
+        X_PC: pose of the optical frame C in the frame P it is attached to.
+        base_frame: scoped name of P; the world by default.
+        width: columns of the images.
+        height: rows of the images.
+        renderer_name: the renderer, shared by the cameras that name the same.
+
+    Returns:
+        Drake's settings, to be put into ``Scenario.cameras``.
+    """
+    return CameraConfig(
+        name=name,
+        width=width,
+        height=height,
+        focal=CameraConfig.FovDegrees(y=42.5),
+        z_near=0.3,
+        z_far=5.0,
+        X_PB=Transform(X_PC) if not base_frame else _transform(base_frame, X_PC),
+        rgb=True,
+        depth=True,
+        label=True,
+        renderer_name=renderer_name,
+    )
+
+
+def _transform(base_frame: str, X_PC: RigidTransform) -> Transform:
+    transform = Transform(X_PC)
+    transform.base_frame = base_frame
+    return transform
+
+
+def add_cameras(
+    scenario: Scenario, builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph
+) -> None:
+    """Adds the scenario's cameras to a simulated station and exports their ports.
+
+    These are, of camera NAME, ``NAME.rgb_image`` (ImageRgba8U), ``NAME.depth_image``
+    (ImageDepth32F, metres along the optical axis; 0 too near, infinity too far),
+    ``NAME.label_image`` (ImageLabel16I), ``NAME.point_cloud`` (points in W, with colours if the
+    camera has ``rgb``) and ``NAME.X_WC`` (RigidTransform). All of them are computed on demand;
+    the settings ``fps``, ``capture_offset``, ``output_delay`` and ``lcm_bus`` are those of
+    Drake's own cameras and have no use here.
+
+    Args:
+        scenario: the scenario.
+        builder: the station's diagram.
+        plant: the finalized plant.
+        scene_graph: the scene graph; renderers that it lacks are added.
+
+    Raises:
+        InputError: settings that Drake refuses, an unknown frame, or a name used twice.
+    """
+    for key, config in scenario.cameras.items():
+        _add_renderer(scenario, key, scene_graph)
+        sensor = add_sensor(scenario, key, builder, plant, scene_graph)
+        add_camera_ports(
+            builder,
+            config,
+            rgb=sensor.color_image_output_port(),
+            depth=sensor.depth_image_32F_output_port(),
+            label=sensor.label_image_output_port(),
+            pose=sensor.body_pose_in_world_output_port(),
+        )
+
+
+def add_sensor(
+    scenario: Scenario,
+    key: str,
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+) -> RgbdSensor:
+    """Adds Drake's sensor for one camera, with its body frame at the optical frame C.
+
+    Its port ``body_pose_in_world`` is therefore X_WC.
+
+    Args:
+        scenario: the scenario.
+        key: the camera's key in ``scenario.cameras``.
+        builder: the diagram.
+        plant: the finalized plant.
+        scene_graph: the scene graph.
+    """
+    config = deepcopy(scenario.cameras[key])
+    if builder.HasSubsystemNamed(f"{config.name}.sensor"):
+        _fail(scenario, key, "name", f"two cameras are called '{config.name}'", "rename one")
+    frame_name = config.X_PB.base_frame
+    try:
+        P = GetScopedFrameByName(plant, frame_name) if frame_name else plant.world_frame()
+    except RuntimeError:
+        _fail(
+            scenario,
+            key,
+            "X_PB.base_frame",
+            f"there is no frame '{frame_name}'",
+            "name a frame as MODEL::FRAME, or one that a directive adds",
+        )
+    try:
+        X_BC = config.X_BD.GetDeterministicValue()
+        X_PC = config.X_PB.GetDeterministicValue() @ X_BC
+        config.X_BC = Transform(X_BC.inverse() @ config.X_BC.GetDeterministicValue())
+        config.X_BD = Transform()
+        color, depth = config.MakeCameras()
+    except RuntimeError as error:
+        _fail(scenario, key, "", " ".join(str(error).split()), "")
+    sensor = builder.AddNamedSystem(
+        f"{config.name}.sensor",
+        RgbdSensor(
+            parent_id=plant.GetBodyFrameIdOrThrow(P.body().index()),
+            X_PB=P.GetFixedPoseInBodyFrame() @ X_PC,
+            color_camera=color,
+            depth_camera=depth,
+        ),
+    )
+    builder.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+    return sensor
+
+
+def add_camera_ports(
+    builder: DiagramBuilder,
+    config: CameraConfig,
+    *,
+    rgb: OutputPort,
+    depth: OutputPort,
+    label: OutputPort,
+    pose: OutputPort,
+) -> None:
+    """Exports a camera's images and pose, and adds the point cloud made of them.
+
+    Args:
+        builder: the station's diagram.
+        config: the camera's settings.
+        rgb: port of the colour image.
+        depth: port of the depth image in metres.
+        label: port of the label image.
+        pose: port of X_WC.
+    """
+    _, depth_camera = config.MakeCameras()
+    # Depth and colour share their pixels only where they share their frame.
+    aligned = config.X_BC.GetDeterministicValue().IsExactlyEqualTo(
+        config.X_BD.GetDeterministicValue()
+    )
+    colored = config.rgb and aligned
+    cloud = builder.AddNamedSystem(
+        f"{config.name}.to_point_cloud",
+        DepthImageToPointCloud(
+            camera_info=depth_camera.core().intrinsics(),
+            pixel_type=PixelType.kDepth32F,
+            fields=BaseField.kXYZs | BaseField.kRGBs if colored else BaseField.kXYZs,
+        ),
+    )
+    builder.Connect(depth, cloud.depth_image_input_port())
+    if colored:
+        builder.Connect(rgb, cloud.color_image_input_port())
+    builder.Connect(pose, cloud.camera_pose_input_port())
+    for name, port in (
+        ("rgb_image", rgb),
+        ("depth_image", depth),
+        ("label_image", label),
+        ("point_cloud", cloud.point_cloud_output_port()),
+        ("X_WC", pose),
+    ):
+        builder.ExportOutput(port, f"{config.name}.{name}")
+
+
+def _add_renderer(scenario: Scenario, key: str, scene_graph: SceneGraph) -> None:
+    config = scenario.cameras[key]
+    if not scene_graph.HasRenderer(config.renderer_name):
+        scene_graph.AddRenderer(config.renderer_name, _make_renderer(scenario, key))
+
+
+def _make_renderer(scenario: Scenario, key: str) -> RenderEngine:
+    """Makes the renderer that a camera asks for; VTK, which needs no display, by default."""
+    config = scenario.cameras[key]
+    wanted = config.renderer_class
+    background = config.background
+    if isinstance(wanted, str):
+        named = {
+            "": RenderEngineVtkParams,
+            "RenderEngineVtk": RenderEngineVtkParams,
+            "RenderEngineGl": RenderEngineGlParams,
+            "RenderEngineGltfClient": RenderEngineGltfClientParams,
+        }
+        if wanted not in named:
+            known = ", ".join(name for name in named if name)
+            _fail(scenario, key, "renderer_class", f"unknown renderer '{wanted}'", f"use {known}")
+        wanted = named[wanted]()
+        if isinstance(wanted, RenderEngineVtkParams):
+            wanted.default_clear_color = [background.r(), background.g(), background.b()]
+        else:
+            wanted.default_clear_color = background
+    if isinstance(wanted, RenderEngineGlParams) and not os.environ.get("DISPLAY"):
+        warnings.warn(
+            f"camera '{config.name}' asks for RenderEngineGl, which needs a display, and there is "
+            "none; it is rendered by RenderEngineVtk",
+            stacklevel=2,
+        )
+        clear = wanted.default_clear_color
+        wanted = RenderEngineVtkParams(default_clear_color=[clear.r(), clear.g(), clear.b()])
+    if isinstance(wanted, RenderEngineGlParams):
+        return MakeRenderEngineGl(wanted)
+    if isinstance(wanted, RenderEngineGltfClientParams):
+        return MakeRenderEngineGltfClient(wanted)
+    return MakeRenderEngineVtk(wanted)
+
+
+def _fail(scenario: Scenario, key: str, field: str, message: str, mend: str) -> NoReturn:
+    path = f"cameras.{key}" + (f".{field}" if field else "")
+    raise InputError(Finding(message, mend, file=str(scenario.file or ""), key=path))

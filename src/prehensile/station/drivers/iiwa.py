@@ -1,0 +1,141 @@
+"""The KUKA LBR iiwa: joint positions with feed-forward torque, at 200 Hz."""
+
+import numpy as np
+from drake import lcmt_iiwa_command, lcmt_iiwa_status
+from pydrake.manipulation import (
+    IiwaCommandSender,
+    IiwaControlMode,
+    IiwaDriver,
+    IiwaStatusReceiver,
+    ParseIiwaControlMode,
+    SimIiwaDriver,
+    kIiwaArmNumJoints,
+    position_enabled,
+    torque_enabled,
+)
+from pydrake.systems.framework import OutputPort
+from pydrake.systems.lcm import LcmPublisherSystem, LcmSubscriberSystem
+from pydrake.systems.primitives import Gain, Multiplexer, SharedPointerSystem
+
+from prehensile.station.drivers.site import Driver, Site
+from prehensile.station.guard import COMMAND_PERIOD, GuardLimits, JointGuard
+from prehensile.station.robot_plant import make_robot_plant
+
+_TORQUE_PERIOD = 0.001  # s; the driver takes commands at 1 kHz if they are torques alone
+_STATUS_TIMEOUT = 10.0  # s to wait for the first status message
+
+_MEASUREMENTS = (
+    "position_commanded",
+    "position_measured",
+    "velocity_estimated",
+    "torque_commanded",
+    "torque_measured",
+    "torque_external",
+)
+
+
+def _check(site: Site) -> IiwaControlMode:
+    """Checks the configuration against the model; returns its control mode."""
+    site.check_joints(kIiwaArmNumJoints)
+    config: IiwaDriver = site.config
+    hand = config.hand_model_name
+    if hand and not site.plant.HasModelInstanceNamed(hand):
+        site.fail(f"no model '{hand}'", "name the hand's model, or leave it out", "hand_model_name")
+    try:
+        mode = ParseIiwaControlMode(config.control_mode)
+    except RuntimeError:
+        site.fail(
+            f"unknown control mode '{config.control_mode}'",
+            "use position_and_torque, position_only or torque_only",
+            "control_mode",
+        )
+    if config.desired_kp_gains is not None and not position_enabled(mode):
+        site.fail("torque_only has no position gains", "leave them out", "desired_kp_gains")
+    return mode
+
+
+def _add_guard(site: Site, mode: IiwaControlMode, measured: OutputPort) -> JointGuard:
+    return site.add_guard(
+        GuardLimits.of_plant(site.plant, site.instance),
+        measured,
+        effort="feedforward_torque" if torque_enabled(mode) else "",
+        position=position_enabled(mode),
+        period=COMMAND_PERIOD if position_enabled(mode) else _TORQUE_PERIOD,
+        default_position=site.plant.GetDefaultPositions(site.instance),
+    )
+
+
+def _simulate(site: Site) -> None:
+    mode = _check(site)
+    builder = site.builder
+    # The arm's own model of itself: whatever is bolted to it counts as one rigid piece.
+    controller_plant = make_robot_plant(site.scenario, [site.name], frozen_children=True)
+    builder.AddNamedSystem(f"{site.name}.controller_plant", SharedPointerSystem(controller_plant))
+    driver = SimIiwaDriver.AddToBuilder(
+        builder=builder,
+        plant=site.plant,
+        iiwa_instance=site.instance,
+        driver_config=site.config,
+        controller_plant=controller_plant,
+    )
+    driver.set_name(f"{site.name}.driver")
+    guard = _add_guard(site, mode, driver.GetOutputPort("position_measured"))
+    if position_enabled(mode):
+        builder.Connect(guard.GetOutputPort("position"), driver.GetInputPort("position"))
+    if torque_enabled(mode):
+        builder.Connect(guard.GetOutputPort("effort"), driver.GetInputPort("torque"))
+    for name in (*_MEASUREMENTS, "state_estimated"):
+        site.export_output(driver.GetOutputPort(name), name)
+
+
+def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
+    mode = _check(site)
+    builder, name = site.builder, site.name
+    receiver = builder.AddNamedSystem(f"{name}.status_receiver", IiwaStatusReceiver())
+    subscriber = builder.AddNamedSystem(
+        f"{name}.status_subscriber",
+        LcmSubscriberSystem.Make(
+            channel="IIWA_STATUS",
+            lcm_type=lcmt_iiwa_status,
+            lcm=site.lcm,
+            use_cpp_serializer=True,
+            wait_for_message_on_initialization_timeout=_STATUS_TIMEOUT,
+        ),
+    )
+    builder.Connect(subscriber.get_output_port(), receiver.get_input_port())
+    measured = receiver.get_position_measured_output_port()
+    guard = _add_guard(site, mode, measured)
+
+    sender = builder.AddNamedSystem(f"{name}.command_sender", IiwaCommandSender(control_mode=mode))
+    publisher = builder.AddNamedSystem(
+        f"{name}.command_publisher",
+        LcmPublisherSystem.Make(
+            channel="IIWA_COMMAND",
+            lcm_type=lcmt_iiwa_command,
+            lcm=site.lcm,
+            publish_period=COMMAND_PERIOD if position_enabled(mode) else _TORQUE_PERIOD,
+            use_cpp_serializer=True,
+        ),
+    )
+    builder.Connect(sender.get_output_port(), publisher.get_input_port())
+    if position_enabled(mode):
+        builder.Connect(guard.GetOutputPort("position"), sender.get_position_input_port())
+    if torque_enabled(mode):
+        builder.Connect(guard.GetOutputPort("effort"), sender.get_torque_input_port())
+
+    for port_name in _MEASUREMENTS:
+        port = receiver.GetOutputPort(port_name)
+        if port_name in ("torque_commanded", "torque_measured"):
+            # The messages carry these two with the opposite sign.
+            negate = builder.AddSystem(Gain(-1.0, kIiwaArmNumJoints))
+            builder.Connect(port, negate.get_input_port())
+            port = negate.get_output_port()
+        site.export_output(port, port_name)
+    state = builder.AddSystem(Multiplexer([kIiwaArmNumJoints] * 2))
+    builder.Connect(measured, state.get_input_port(0))
+    builder.Connect(receiver.get_velocity_estimated_output_port(), state.get_input_port(1))
+    site.export_output(state.get_output_port(0), "state_estimated")
+    return measured, np.eye(kIiwaArmNumJoints)
+
+
+DRIVER = Driver(IiwaDriver, _simulate, _connect)
