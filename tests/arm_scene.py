@@ -1,7 +1,6 @@
 """A small station for the tests of planning: arm, hand, table and two bins, and nothing loose."""
 
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from prehensile.models.registry import package_map
@@ -34,7 +33,9 @@ def make_diagram() -> RobotDiagram:
     for name, (x, y) in (("bin0", BIN0), ("bin1", BIN1)):
         bin_ = add("bin", name)
         turn = RollPitchYaw(0, 0, 1.5707963267948966 if name == "bin0" else 0.0)
-        plant.WeldFrames(W, plant.GetFrameByName("base_link", bin_), RigidTransform(turn, [x, y, 0]))
+        plant.WeldFrames(
+            W, plant.GetFrameByName("base_link", bin_), RigidTransform(turn, [x, y, 0])
+        )
     for joint, q in (("iiwa_joint_1", -0.8), ("iiwa_joint_2", 0.3), ("iiwa_joint_4", -1.4)):
         plant.GetJointByName(joint, iiwa).set_default_angle(q)
     plant.GetJointByName("iiwa_joint_6", iiwa).set_default_angle(1.4)

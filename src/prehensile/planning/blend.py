@@ -46,12 +46,13 @@ def round_corners(
     Args:
         path: corners (K, n), K >= 2, no two neighbours equal.
         deviation: largest distance from a corner, Euclidean in joint space (rad, > 0).
-        max_interval: largest interval on a line (rad).
+        max_interval: largest interval on a line (rad); short paths get at least 16 intervals.
         corner_intervals: intervals that a parabola is cut into.
     """
     difference = np.diff(path, axis=0)
     length = np.linalg.norm(difference, axis=1)
     direction = difference / length[:, None]
+    max_interval = min(max_interval, float(np.sum(length)) / 16)
     turn = np.linalg.norm(np.diff(direction, axis=0), axis=1)
     # The parabola with tangents of length d passes the corner at d |u2 - u1| / 4.
     cut = np.zeros(len(path))
@@ -65,7 +66,7 @@ def round_corners(
     for k, u in enumerate(direction):
         straight = length[k] - cut[k] - cut[k + 1]
         if straight > 1e-9:
-            count = int(np.ceil(straight / max_interval))
+            count = int(np.ceil(straight / max_interval - 1e-9))
             steps += [straight / count] * count
             starts += [u] * count
             ends += [u] * count
