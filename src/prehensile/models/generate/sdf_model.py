@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
 Pose = tuple[float, float, float, float, float, float]
-"""x, y, z in metres, then roll, pitch, yaw in radians (rotations about fixed axes in this order)."""
+"""x, y, z in metres, then roll, pitch, yaw in radians (about fixed axes, in this order)."""
 
 IDENTITY: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -212,8 +212,10 @@ def sdf_text(model: Model) -> str:
         name = f"apart_{i}"
         out.append(f"    <drake:collision_filter_group name={quoteattr(name)}>")
         out += [f"      <drake:member>{link}</drake:member>" for link in group]
-        out.append(f"      <drake:ignored_collision_filter_group>{name}"
-                   "</drake:ignored_collision_filter_group>")
+        out.append(
+            f"      <drake:ignored_collision_filter_group>{name}"
+            "</drake:ignored_collision_filter_group>"
+        )
         out.append("    </drake:collision_filter_group>")
     return "\n".join([*out, "  </model>", "</sdf>", ""])
 

@@ -49,9 +49,35 @@ def cover_shape(shape: Shape, bulge: float = BULGE) -> np.ndarray:
         grown = np.hypot(radius, 0.5 * step)
         return np.column_stack([np.zeros((len(z), 2)), z, np.full(len(z), grown)])
     if shape.kind == "cylinder":
-        boxes = _cover_box(np.array([2.0 * radius, 2.0 * radius, length]), bulge)
-        return boxes[np.hypot(boxes[:, 0], boxes[:, 1]) < radius + boxes[:, 3]]
+        return _cover_cylinder(radius, length, bulge)
     raise ValueError(f"no spheres for a {shape.kind}")
+
+
+def _cover_cylinder(radius: float, length: float, bulge: float) -> np.ndarray:
+    """A grid of spheres, each about the part of the cylinder that lies in its cell."""
+    counts = np.ones(3, dtype=int)
+    size = np.array([2.0 * radius, 2.0 * radius, length])
+    while True:
+        rows = []
+        half = 0.5 * size / counts
+        axes = [h * (2.0 * np.arange(n) - n + 1.0) for h, n in zip(half, counts, strict=True)]
+        fractions = np.linspace(-1.0, 1.0, 33)
+        for x in axes[0]:
+            for y in axes[1]:
+                u, v = np.meshgrid(x + half[0] * fractions, y + half[1] * fractions)
+                # Points beyond the rim are drawn back to it; all of the cell's rim is met so.
+                shrink = np.minimum(1.0, radius / np.maximum(np.hypot(u, v), 1e-12))
+                p = np.column_stack([(u * shrink).ravel(), (v * shrink).ravel()])
+                middle = 0.5 * (p.min(axis=0) + p.max(axis=0))
+                reach = np.hypot(np.linalg.norm(p - middle, axis=1).max(), half[2])
+                rows += [[*middle, z, reach] for z in axes[2]]
+        spheres = np.array(rows)
+        out_side = (np.hypot(spheres[:, 0], spheres[:, 1]) + spheres[:, 3]).max() - radius
+        out_top = (np.abs(spheres[:, 2]) + spheres[:, 3]).max() - 0.5 * length
+        if max(out_side, out_top) <= bulge:
+            return spheres
+        longest = np.argmax(half)
+        counts[[0, 1] if longest < 2 else 2] += 1
 
 
 def _cover_box(size: np.ndarray, bulge: float) -> np.ndarray:
@@ -72,4 +98,4 @@ def cover_model(model: Model, bulge: float = BULGE) -> dict[str, np.ndarray]:
     """Link name to spheres (K, 4), for the links that collide."""
     covers = {link.name: cover_link(link, bulge) for link in model.links if link.collisions}
     # Rounding in the file must not open a gap.
-    return {name: rows + [0.0, 0.0, 0.0, 2e-5] for name, rows in covers.items()}
+    return {name: rows + np.array([0.0, 0.0, 0.0, 2e-5]) for name, rows in covers.items()}

@@ -29,13 +29,15 @@ class Block:
     @property
     def shape(self) -> Shape:
         """The box."""
-        size = (round(h - l, 9) for l, h in zip(self.low, self.high, strict=True))
+        size = (round(high - low, 9) for low, high in zip(self.low, self.high, strict=True))
         return Shape("box", tuple(size))
 
     @property
     def pose(self) -> Pose:
         """Of its centre."""
-        x, y, z = (round(0.5 * (h + l), 9) for l, h in zip(self.low, self.high, strict=True))
+        x, y, z = (
+            round(0.5 * (high + low), 9) for low, high in zip(self.low, self.high, strict=True)
+        )
         return (x, y, z, 0.0, 0.0, 0.0)
 
 

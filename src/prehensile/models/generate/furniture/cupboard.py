@@ -48,8 +48,10 @@ def door(name: str, side: int) -> Link:
     x, y = DOOR / 2 + STAND_OFF, -side * HANDLE_Y
     bar = (Shape("capsule", (BAR, BAR_LENGTH)), (x, y, HANDLE_Z, 0.0, 0.0, 0.0))
     posts = [
-        (Shape("box", (STAND_OFF, 1.6 * BAR, 1.6 * BAR)),
-         (DOOR / 2 + STAND_OFF / 2, y, HANDLE_Z + s * 0.42 * BAR_LENGTH, 0.0, 0.0, 0.0))
+        (
+            Shape("box", (STAND_OFF, 1.6 * BAR, 1.6 * BAR)),
+            (DOOR / 2 + STAND_OFF / 2, y, HANDLE_Z + s * 0.42 * BAR_LENGTH, 0.0, 0.0, 0.0),
+        )
         for s in (-1, 1)
     ]
     handle = [("handle", bar), ("post_low", posts[0]), ("post_high", posts[1])]
@@ -59,10 +61,14 @@ def door(name: str, side: int) -> Link:
         name,
         pose,
         solids.body(DOOR_MASS, [(slab.shape, slab.pose)]),
-        (*plain_visuals([slab], (0.86, 0.87, 0.85, 1.0)),
-         *(Visual(n, *part, rgba=grey) for n, part in handle)),
-        (Collision("slab", slab.shape, slab.pose, _carcass.WOOD),
-         *(Collision(n, *part, STEEL) for n, part in handle)),
+        (
+            *plain_visuals([slab], (0.86, 0.87, 0.85, 1.0)),
+            *(Visual(n, *part, rgba=grey) for n, part in handle),
+        ),
+        (
+            Collision("slab", slab.shape, slab.pose, _carcass.WOOD),
+            *(Collision(n, *part, STEEL) for n, part in handle),
+        ),
     )
 
 
@@ -74,8 +80,16 @@ def model() -> Model:
     # Left and right as seen by one who stands before the cupboard and looks at it.
     left, right = door("left_door", -1), door("right_door", 1)
     joints = tuple(
-        Joint(f"{d.name}_hinge", "revolute", "base_link", d.name, (0, 0, z), 0.0, OPEN,
-              damping=DAMPING)
+        Joint(
+            f"{d.name}_hinge",
+            "revolute",
+            "base_link",
+            d.name,
+            (0, 0, z),
+            0.0,
+            OPEN,
+            damping=DAMPING,
+        )
         for d, z in ((left, -1), (right, 1))
     )
     frames = tuple(

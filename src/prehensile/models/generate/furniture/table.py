@@ -20,8 +20,12 @@ def blocks() -> list[Block]:
     """The top and the four legs."""
     x, y = LENGTH / 2, WIDTH / 2
     parts = [Block("top", (-x, -y, -PLATE), (x, y, 0.0))]
-    for sx, sy, name in ((1, 1, "front_left"), (1, -1, "front_right"), (-1, 1, "back_left"),
-                         (-1, -1, "back_right")):
+    for sx, sy, name in (
+        (1, 1, "front_left"),
+        (1, -1, "front_right"),
+        (-1, 1, "back_left"),
+        (-1, -1, "back_right"),
+    ):
         outer, inner = (x - INSET, y - INSET), (x - INSET - LEG, y - INSET - LEG)
         xs, ys = sorted((sx * outer[0], sx * inner[0])), sorted((sy * outer[1], sy * inner[1]))
         parts.append(Block(f"leg_{name}", (xs[0], ys[0], -HEIGHT), (xs[1], ys[1], -PLATE)))

@@ -94,9 +94,7 @@ def diagonal(
     return Inertial(mass, com, (*moments, 0.0, 0.0, 0.0))
 
 
-def capsule(
-    name: str, radius: float, start: Sequence[float], end: Sequence[float]
-) -> Collision:
+def capsule(name: str, radius: float, start: Sequence[float], end: Sequence[float]) -> Collision:
     """A capsule between two points in the plane x = 0 of a link."""
     a, b = np.asarray(start, float), np.asarray(end, float)
     along = b - a
@@ -110,11 +108,19 @@ def collisions(arm: Arm) -> list[tuple[Collision, ...]]:
     """The collision shapes of links 0 to 7."""
     shoulder, elbow = arm.drum
     rise = [arm.axes[i + 1].pose[2] - arm.axes[i].pose[2] for i in range(6)]
-    foot = Collision("foot", Shape("cylinder", (0.1 * shoulder / 0.068, 0.1575)),
-                     (0.0, 0.0, 0.07875, 0.0, 0.0, 0.0), METAL)
+    foot = Collision(
+        "foot",
+        Shape("cylinder", (0.1 * shoulder / 0.068, 0.1575)),
+        (0.0, 0.0, 0.07875, 0.0, 0.0, 0.0),
+        METAL,
+    )
     depth = 0.113 if shoulder < 0.08 else 0.136
-    plug = Collision("plug", Shape("box", (depth - 0.03, 0.13, 0.13)),
-                     (-0.5 * (depth + 0.03), 0.0, 0.065, 0.0, 0.0, 0.0), METAL)
+    plug = Collision(
+        "plug",
+        Shape("box", (depth - 0.03, 0.13, 0.13)),
+        (-0.5 * (depth + 0.03), 0.0, 0.065, 0.0, 0.0, 0.0),
+        METAL,
+    )
 
     def rising(drum: float, height: float, side: float) -> tuple[Collision, ...]:
         """An odd link: tube up from its own axis, drum on the next axis, off to one side."""
@@ -140,12 +146,19 @@ def collisions(arm: Arm) -> list[tuple[Collision, ...]]:
         standing(elbow, elbow, rise[3]),
         (
             capsule("tube", 0.066, (0.0, 0.0, 0.056), (0.0, 0.015, 0.09)),
-            Collision("arm", Shape("box", (0.1, 0.03, 0.16)),
-                      (0.0, 0.083, 0.185, 0.0, 0.0, 0.0), METAL),
+            Collision(
+                "arm", Shape("box", (0.1, 0.03, 0.16)), (0.0, 0.083, 0.185, 0.0, 0.0, 0.0), METAL
+            ),
         ),
         (capsule("ball", 0.067, (0.0, -0.018, 0.0), (0.0, 0.012, 0.0)),),
-        (Collision("flange", Shape("cylinder", (0.052, arm.flange)),
-                   (0.0, 0.0, 0.5 * arm.flange, 0.0, 0.0, 0.0), METAL),),
+        (
+            Collision(
+                "flange",
+                Shape("cylinder", (0.052, arm.flange)),
+                (0.0, 0.0, 0.5 * arm.flange, 0.0, 0.0, 0.0),
+                METAL,
+            ),
+        ),
     ]
 
 
@@ -197,7 +210,7 @@ def write(arm: Arm, folder: Path) -> None:
     """Writes all files of an arm."""
     made = model(arm)
     write_text(folder / f"{arm.name}.sdf", sdf_text(made))
-    write_spheres(folder, cover_model(made))
+    write_spheres(folder, cover_model(made, bulge=0.036))
     write_description(
         folder,
         title=arm.title,

@@ -43,9 +43,7 @@ def model() -> Model:
     frames = [Frame("camera_link", "base_link", (0.0, LEFT_IMAGER_Y, z, 0.0, 0.0, 0.0))]
     for name, y in (("depth", LEFT_IMAGER_Y), ("color", COLOR_Y)):
         frames.append(Frame(f"{name}_frame", "base_link", (x, y, z, 0.0, 0.0, 0.0)))
-        frames.append(
-            Frame(f"{name}_optical_frame", "base_link", (x, y, z, -pi / 2, 0.0, -pi / 2))
-        )
+        frames.append(Frame(f"{name}_optical_frame", "base_link", (x, y, z, -pi / 2, 0.0, -pi / 2)))
     comment = "Intel RealSense D415. The origin is the thread for the tripod; x to the front, z up."
     return Model("d415", comment, (body,), frames=tuple(frames))
 

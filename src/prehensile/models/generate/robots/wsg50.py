@@ -74,10 +74,26 @@ def model() -> Model:
     left = Link("left_finger", left_pose, inertial, visuals, collisions)
     right = Link("right_finger", at(FINGER_X, FINGER_Y), inertial, visuals, collisions)
     joints = (
-        Joint("left_finger_sliding_joint", "prismatic", "body", "left_finger", (-1, 0, 0),
-              -STROKE, 0.0, EFFORT),
-        Joint("right_finger_sliding_joint", "prismatic", "body", "right_finger", (1, 0, 0),
-              0.0, STROKE, EFFORT),
+        Joint(
+            "left_finger_sliding_joint",
+            "prismatic",
+            "body",
+            "left_finger",
+            (-1, 0, 0),
+            -STROKE,
+            0.0,
+            EFFORT,
+        ),
+        Joint(
+            "right_finger_sliding_joint",
+            "prismatic",
+            "body",
+            "right_finger",
+            (1, 0, 0),
+            0.0,
+            STROKE,
+            EFFORT,
+        ),
     )
     middle_of_pads = FINGER_Y - BODY_Y + FINGER_TIP - PAD_LENGTH / 2
     return Model(
@@ -107,7 +123,7 @@ def generate(folder: Path) -> None:
             "the pads. The pads are compliant hydroelastic, everything else is rigid."
         ),
         sources=[
-            "Schunk, WSG 50 servo-electric 2-finger parallel gripper, assembly and operating manual",
+            "Schunk, WSG 50 servo-electric 2-finger parallel gripper, operating manual",
             "Frames, joints and masses: figures of the Drake project's model; inertias from shape",
         ],
     )
