@@ -1,0 +1,357 @@
+"""Clearing a bin of objects never met before: look, choose a grasp, pick, carry, release, again.
+
+The task of Tedrake, Robotic Manipulation, chapter 5, as the states of a
+:class:`~prehensile.behavior.state_machine.StateMachine`. It knows the arm, the bins and the
+calibrated cameras of its station, and of the objects only what the depth images show.
+"""
+
+import dataclasses as dc
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake import geometry
+from pydrake.math import RigidTransform
+
+from prehensile.behavior.state_machine import Decision, Senses
+from prehensile.behavior.trajectory_player import Segment, SegmentPlayer
+from prehensile.grasping import (
+    WSG50,
+    Grasp,
+    GraspConfig,
+    ParallelGripper,
+    select_grasps,
+)
+from prehensile.perception import Box, Cloud, fuse_depth_images
+from prehensile.planning.arm import ArmModel
+from prehensile.planning.pick import (
+    PlacePlan,
+    drop_poses,
+    plan_move,
+    plan_pick,
+    plan_place,
+)
+from prehensile.planning.trajectory import TimedPath
+from prehensile.tasks.report import Attempt
+
+
+@dc.dataclass(frozen=True)
+class ClearBinConfig:
+    """Settings of the task."""
+
+    # Time that one look, its choice and its plan take on the robot's clock [s]; the arm waits.
+    think_time: float = 0.4
+    # Time for the fingers to close and for the grip to settle [s]; above 0.
+    close_time: float = 0.7
+    # Time for the fingers to let go [s]; above 0.
+    open_time: float = 0.3
+    # A closed hand narrower than this holds nothing [m]; above 0.
+    empty_width: float = 0.004
+    # Points left in the bin below which it counts as empty; 1 or more.
+    min_points: int = 40
+    # Failures in a row after which the task gives up; 1 or more.
+    max_failures: int = 6
+    # Attempts in all after which the task gives up; 1 or more.
+    max_attempts: int = 60
+    # Straight line into the grasp [m]; above 0.
+    pregrasp_distance: float = 0.08
+    # Straight line up out of the bin [m]; above 0.
+    lift_height: float = 0.24
+    # Grasps within this distance of one that failed are tried last [m]; 0 or more.
+    failed_distance: float = 0.03
+    # Height above the floor of the second bin at which the lowest point held is let go [m].
+    drop_height: float = 0.08
+    # Settings of grasp selection.
+    grasp: GraspConfig = dc.field(default_factory=GraspConfig)
+
+
+@dc.dataclass(frozen=True)
+class BinGeometry:
+    """What is known of a bin.
+
+    Attributes:
+        X_WB: its pose.
+        low, high: corners of its interior in its frame B (3,), up to the rim.
+        walls: its floor and walls as boxes in W.
+    """
+
+    X_WB: RigidTransform
+    low: np.ndarray
+    high: np.ndarray
+    walls: Sequence[Box]
+
+    def region(self, *, inset: float, above_floor: float, above_rim: float) -> Box:
+        """The part of the interior to look at: inset from the walls, in W."""
+        low = self.low + np.array([inset, inset, above_floor])
+        high = self.high + np.array([-inset, -inset, above_rim])
+        return Box(self.X_WB @ RigidTransform(0.5 * (low + high)), high - low)
+
+    @property
+    def depth(self) -> float:
+        """From the inner floor to the rim."""
+        return float(self.high[2] - self.low[2])
+
+    @property
+    def floor_height(self) -> float:
+        """Height of the inner floor in W, the bin standing upright."""
+        return float((self.X_WB @ RigidTransform(self.low)).translation()[2])
+
+
+@dc.dataclass(frozen=True)
+class Camera:
+    """A calibrated camera: the prefix of its ports and its intrinsic matrix K (3, 3)."""
+
+    name: str
+    K: np.ndarray
+
+
+@dc.dataclass(frozen=True)
+class Pick:
+    """A pick under way: what is known of it so far, and the motions that are left."""
+
+    attempt: Attempt
+    lift: TimedPath
+    carry: TimedPath
+
+
+@dc.dataclass(frozen=True)
+class Memory:
+    """What the task remembers.
+
+    Attributes:
+        q: where the arm will be when the motion under way has ended (n,).
+        attempts: those that are over.
+        pick: the one under way.
+        failures: number of failures in a row.
+        failed: where grasps failed since the last success, p_WG.
+        finished: why the task ended ("" while it goes on).
+    """
+
+    q: np.ndarray
+    attempts: tuple[Attempt, ...] = ()
+    pick: Pick | None = None
+    failures: int = 0
+    failed: tuple[np.ndarray, ...] = ()
+    finished: str = ""
+
+
+class ClearBin:
+    """States: ``look``, ``pick``, ``lift``, ``carry``, ``release``, ``retreat``, ``done``."""
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        cameras: Sequence[Camera],
+        pick_bin: BinGeometry,
+        place_bin: BinGeometry,
+        *,
+        seed: int,
+        config: ClearBinConfig | None = None,
+        gripper: ParallelGripper = WSG50,
+    ) -> None:
+        """Makes the task.
+
+        Args:
+            arm: kinematics and collision geometry of the arm, the hand and the fixed things.
+            cameras: the cameras that look into the first bin.
+            pick_bin: the bin to clear.
+            place_bin: the bin to fill.
+            seed: seed of every random choice.
+            config: settings; ``ClearBinConfig()`` if None.
+            gripper: shape of the hand.
+        """
+        self.config = config or ClearBinConfig()
+        self._arm = arm
+        self._cameras = cameras
+        self._pick_bin = pick_bin
+        self._place_bin = place_bin
+        self._seed = seed
+        self._gripper = gripper
+        self._q_home = arm.q_default
+
+    def start(self) -> Decision:
+        """Stands at home and looks."""
+        return Decision("look", Memory(self._q_home))
+
+    def decide(
+        self, state: str, memory: Memory, *, time: float, motion_done: bool, senses: Senses
+    ) -> Decision | None:
+        """See :class:`~prehensile.behavior.state_machine.Task`."""
+        pick = memory.pick
+        holding = senses.width > self.config.empty_width
+        if state == "carry" and pick is not None and not holding:
+            # It fell on the way. Go on to the second bin, where the view of the first is free.
+            reason = "the object fell out of the hand"
+            return Decision("carry", _settle(memory, pick.attempt, time, "dropped", reason))
+        if not motion_done:
+            return None
+        if state == "look":
+            return self._look(memory, time, senses)
+        if pick is None:  # after a failure
+            return self._next(memory)
+        if state == "pick" and holding:
+            return self._move("lift", memory, pick.lift)
+        if state == "pick":
+            reason = "the fingers closed on nothing"
+            memory = _settle(memory, pick.attempt, time, "empty", reason)
+            return self._retreat(memory, pick, lifted=False)
+        if state == "lift" and holding:
+            return self._move("carry", memory, pick.carry)
+        if state == "lift":
+            reason = "the object slipped while it was lifted"
+            memory = _settle(memory, pick.attempt, time, "dropped", reason)
+            return self._retreat(memory, pick, lifted=True)
+        if state == "carry":
+            return Decision("release", memory, self._open(memory.q, self.config.open_time))
+        return self._next(_settle(memory, pick.attempt, time, "moved", ""))  # release
+
+    def _move(self, state: str, memory: Memory, motion: TimedPath) -> Decision:
+        """Moves with the hand closed."""
+        memory = dc.replace(memory, q=motion.q_end)
+        return Decision(state, memory, SegmentPlayer([Segment.move(motion, 0.0)]))
+
+    def _open(self, q: np.ndarray, duration: float) -> SegmentPlayer:
+        """Waits with the hand wide open."""
+        return SegmentPlayer([Segment.wait(q, self._gripper.max_width, duration)])
+
+    def _next(self, memory: Memory, motion: SegmentPlayer | None = None) -> Decision:
+        """Looks again, or gives up."""
+        config = self.config
+        reason = ""
+        if memory.failures >= config.max_failures:
+            last = memory.attempts[-1]
+            reason = f"gave up after {memory.failures} failures in a row, the last: {last.reason}"
+        elif len(memory.attempts) >= config.max_attempts:
+            reason = f"gave up after {len(memory.attempts)} attempts"
+        if reason:
+            return Decision("done", dc.replace(memory, finished=reason), motion, finished=True)
+        return Decision("look", memory, motion)
+
+    def _look(self, memory: Memory, now: float, senses: Senses) -> Decision:
+        """Perceives, chooses and plans one pick; the arm waits `think_time` before it moves."""
+        started = time.perf_counter()
+        config = self.config
+        cloud = self._see(senses)
+        if len(cloud) < config.min_points:
+            memory = dc.replace(memory, finished="the bin is empty")
+            return Decision("done", memory, finished=True)
+        number = len(memory.attempts) + 1
+        rng = np.random.default_rng([self._seed, number])
+        attempt = Attempt(number, now, now, "unfinished", "the run ended", points=len(cloud))
+
+        def give_up(outcome: str, reason: str) -> Decision:
+            failed = dc.replace(attempt, think_wall=time.perf_counter() - started)
+            again = _settle(memory, failed, now, outcome, reason)
+            return self._next(again, self._open(memory.q, config.think_time))
+
+        result = select_grasps(cloud, self._gripper, self._pick_bin.walls, config.grasp, rng)
+        if not result.success:
+            return give_up("no grasp", result.status.value)
+        grasps = self._untried_first(result.grasps, memory.failed)
+        attempt = dc.replace(attempt, candidates=len(grasps))
+        plan = plan_pick(
+            self._arm,
+            memory.q,
+            [grasp.X_WG for grasp in grasps],
+            widths=[grasp.width for grasp in grasps],
+            pregrasp_distance=config.pregrasp_distance,
+            lift_height=config.lift_height,
+            rng=rng,
+        )
+        if plan.approach is None or plan.lift is None or plan.X_WG is None:
+            return give_up("no path", plan.reason)
+        grasp = grasps[plan.index]
+        place = self._plan_place(plan.X_WG, plan.lift.q_end, grasp.span, rng)
+        if place.carry is None:
+            return give_up("no path", place.reason)
+        attempt = dc.replace(
+            attempt,
+            X_WG=plan.X_WG,
+            width=grasp.width,
+            score=grasp.score,
+            think_wall=time.perf_counter() - started,
+        )
+        motion = SegmentPlayer(
+            [
+                Segment.wait(memory.q, grasp.width, config.think_time),
+                Segment.move(plan.approach, grasp.width),
+                Segment.wait(plan.approach.q_end, 0.0, config.close_time),
+            ]
+        )
+        pick = Pick(attempt, plan.lift, place.carry)
+        return Decision("pick", dc.replace(memory, pick=pick, q=plan.approach.q_end), motion)
+
+    def _see(self, senses: Senses) -> Cloud:
+        """What the cameras see in the first bin, without its floor and walls."""
+        return fuse_depth_images(
+            [senses.image(f"{c.name}.depth_image").data[:, :, 0] for c in self._cameras],
+            [c.K for c in self._cameras],
+            [senses.image(f"{c.name}.X_WC") for c in self._cameras],
+            self._pick_bin.region(inset=0.003, above_floor=0.005, above_rim=0.1),
+            self.config.grasp.voxel_size,
+        )
+
+    def _untried_first(self, grasps: Sequence[Grasp], failed: Sequence[np.ndarray]) -> list[Grasp]:
+        """The grasps in their order, but those near a recent failure at the end."""
+
+        def tried(grasp: Grasp) -> bool:
+            p_WG = grasp.X_WG.translation()
+            return any(np.linalg.norm(p_WG - p) < self.config.failed_distance for p in failed)
+
+        return sorted(grasps, key=tried)
+
+    def _plan_place(
+        self, X_WG: RigidTransform, q_start: np.ndarray, span: float, rng: np.random.Generator
+    ) -> PlacePlan:
+        """Carries what was grasped at X_WG over the second bin, clear of everything on the way."""
+        p_GPad = self._gripper.p_GPad
+        # Nothing that lay in the bin reached lower than its floor.
+        hang = (X_WG @ RigidTransform(p_GPad)).translation()[2] - self._pick_bin.floor_height
+        shape = geometry.Box(span, hang, self._gripper.pad_width)
+        X_GHeld = RigidTransform(p_GPad + np.array([0.0, 0.5 * hang, 0.0]))
+        # The fingers stay above the rim: the second bin may be full by now.
+        place = self._place_bin
+        pads_above_floor = max(hang + self.config.drop_height, place.depth + 0.02)
+        p_WDrop = place.X_WB.translation().copy()
+        p_WDrop[2] = place.floor_height + pads_above_floor + p_GPad[1]
+        return plan_place(
+            self._arm,
+            q_start,
+            drop_poses(p_WDrop, np.array([0.12, 0.05, 0.0]), rng, count=8),
+            approach_height=0.0,
+            held=(shape, X_GHeld),
+            rng=rng,
+        )
+
+    def _retreat(self, memory: Memory, pick: Pick, *, lifted: bool) -> Decision:
+        """Lets go of what may be left, rises out of the bin and goes home, out of the view."""
+        width = pick.attempt.width
+        q = pick.lift.q_end
+        segments = []
+        if not lifted:
+            segments.append(Segment.wait(memory.q, width, self.config.open_time))
+            segments.append(Segment.move(pick.lift, width))
+        rng = np.random.default_rng([self._seed, len(memory.attempts), 1])
+        home = plan_move(self._arm, q, self._q_home, rng=rng).motion
+        if home is not None:
+            segments.append(Segment.move(home, self._gripper.max_width))
+            q = home.q_end
+        else:
+            segments.append(Segment.wait(q, self._gripper.max_width, self.config.open_time))
+        return Decision("retreat", dc.replace(memory, q=q), SegmentPlayer(segments))
+
+
+def _settle(memory: Memory, attempt: Attempt, now: float, outcome: str, reason: str) -> Memory:
+    """The attempt is over."""
+    attempt = dc.replace(attempt, end=now, outcome=outcome, reason=reason)
+    moved = outcome == "moved"
+    failed = () if moved else memory.failed
+    if not moved and attempt.X_WG is not None:
+        failed = (*failed, attempt.X_WG.translation())
+    return dc.replace(
+        memory,
+        attempts=(*memory.attempts, attempt),
+        pick=None,
+        failures=0 if moved else memory.failures + 1,
+        failed=failed,
+    )
