@@ -122,8 +122,8 @@ def read_yaml(text: str, file: str, findings: list[Finding]) -> Node | None:
     except yaml.YAMLError as error:
         said = " ".join(str(error).split())
         findings.append(Finding(f"not valid YAML: {said}", "", file))
-    except (_TooMuch, RecursionError) as error:
-        said = str(error) if isinstance(error, _TooMuch) else "nested too deeply"
+    except (_TooMuchError, RecursionError) as error:
+        said = str(error) if isinstance(error, _TooMuchError) else "nested too deeply"
         findings.append(Finding(said, "make it simpler", file))
     return None
 
@@ -168,7 +168,7 @@ def close_to(name: str, known: Iterable[str], otherwise: str = "") -> str:
     return "known are " + ", ".join(sorted(names.values()))
 
 
-class _TooMuch(Exception):
+class _TooMuchError(Exception):
     """The text is bigger than anything a person would write."""
 
 
@@ -184,9 +184,11 @@ class _Converter:
     def convert(self, node: yaml.Node, key: str, line: int, depth: int) -> Node:
         self._count += 1
         if self._count > MAX_NODES:
-            raise _TooMuch(f"more than {MAX_NODES} values, aliases expanded")
+            raise _TooMuchError(f"more than {MAX_NODES} values, aliases expanded")
         if depth > MAX_DEPTH:
-            raise _TooMuch(f"nested more than {MAX_DEPTH} deep, or an anchor that contains itself")
+            raise _TooMuchError(
+                f"nested more than {MAX_DEPTH} deep, or an anchor that contains itself"
+            )
         tag = "" if node.tag.startswith(_STANDARD_TAG) else node.tag
         if isinstance(node, yaml.MappingNode):
             value: Any = self._mapping(node, key, depth)

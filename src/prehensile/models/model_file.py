@@ -19,6 +19,8 @@ MAX_MESH_BYTES = 512 << 20
 MAX_RESOLUTION = 100
 """Greatest ratio of a shape's size to its ``mesh_resolution_hint``: finer meshes take gigabytes."""
 
+_POSITIVE = ("drake:hydroelastic_modulus", "drake:point_contact_stiffness")
+_NOT_NEGATIVE = ("drake:mu_static", "drake:mu_dynamic", "mu", "mu2", "drake:relaxation_time")
 _MAX_INCLUDES = 20  # nested SDF files
 _SDF_DOF = {
     "revolute": 1,
@@ -255,26 +257,31 @@ class _FileChecker:
         hint: float | None = None
         for element in collision.walk():
             value = _number(element.attributes.get("value", element.text))
-            if element.tag == "drake:mesh_resolution_hint" and value is not None:
+            if value is None:
+                continue
+            if element.tag == "drake:mesh_resolution_hint":
                 hint = value
-                if not 0 < value < math.inf and not math.isnan(value):
-                    self._add(element, f"the mesh resolution hint is {value:g} m", "it must be > 0")
-                elif size is not None and value > 0 and size / value > MAX_RESOLUTION:
-                    self._add(
-                        element,
-                        f"a mesh resolution of {value:g} m is absurd for a shape of {size:g} m "
-                        f"on link '{link}'",
-                        f"use {size / MAX_RESOLUTION:g} m or more",
-                    )
-            elif element.tag in ("drake:hydroelastic_modulus", "drake:point_contact_stiffness"):
-                if value is not None and value <= 0:
-                    self._add(element, f"<{element.tag}> is {value:g}", "it must be > 0")
-            elif element.tag in ("drake:mu_static", "drake:mu_dynamic", "mu", "mu2"):
-                if value is not None and value < 0:
-                    self._add(element, f"friction is {value:g}", "it must be at least 0")
+                self._check_resolution(element, value, size, link)
+            elif element.tag in _POSITIVE and value <= 0:
+                self._add(element, f"<{element.tag}> is {value:g}", "it must be > 0")
+            elif element.tag in _NOT_NEGATIVE and value < 0:
+                self._add(element, f"<{element.tag}> is {value:g}", "it must be at least 0")
         if size is not None:
             where = f"link '{link}'"
             self._model.shapes.append(Shape(collision.line, where, size, hint))
+
+    def _check_resolution(
+        self, element: Element, hint: float, size: float | None, link: str
+    ) -> None:
+        if math.isinf(hint) or hint <= 0:
+            self._add(element, f"the mesh resolution hint is {hint:g} m", "it must be > 0")
+        elif size is not None and size / hint > MAX_RESOLUTION:
+            self._add(
+                element,
+                f"a mesh resolution of {hint:g} m is absurd for a shape of {size:g} m "
+                f"on link '{link}'",
+                f"use {size / MAX_RESOLUTION:g} m or more",
+            )
 
     def _check_limits(self, limit: Element, joint: str, values: Mapping[str, str]) -> None:
         lower, upper = _number(values.get("lower", "")), _number(values.get("upper", ""))

@@ -194,7 +194,7 @@ def inside(root: Path, path: Path, said: str) -> Path:
         if isinstance(error, InputError):
             raise
         raise InputError(Finding(f"'{said}' cannot be a path: {error}")) from None
-    return Path(os.path.abspath(path))
+    return Path(os.path.normpath(path.absolute()))
 
 
 def _package_name(folder: Path) -> str:

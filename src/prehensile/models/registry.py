@@ -50,7 +50,7 @@ class ModelInfo:
 
     Attributes:
         name: the name it is asked for by; the stem of its file.
-        title: what it is, in a few words.
+        title: what it is, in a few words; its URL if nobody says.
         category: one of :data:`CATEGORIES`.
         description: one or two sentences.
         sources: where its facts and figures come from.
@@ -230,12 +230,13 @@ def _read_info(package: str, root: Path, path: Path, url: str = "") -> ModelInfo
         findings.append(Finding("not a list", file=str(meta_file), key="sources"))
     if findings:
         raise InputError(*findings)
+    url = url or f"package://{package}/{path.relative_to(root).as_posix()}"
     return ModelInfo(
         name=path.stem,
-        title=str(meta.get("title", path.stem)),
+        title=str(meta.get("title", url)),
         category=category,
         description=" ".join(str(meta.get("description", "")).split()),
         sources=tuple(str(source) for source in sources),
-        url=url or f"package://{package}/{path.relative_to(root).as_posix()}",
+        url=url,
         path=path,
     )

@@ -56,7 +56,7 @@ class Element:
         return self.attributes.get("name", "")
 
 
-class _Refused(Exception):
+class _RefusedError(Exception):
     pass
 
 
@@ -91,7 +91,7 @@ def read_xml(path: Path, findings: list[Finding]) -> Element | None:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         if len(stack) >= MAX_DEPTH:
-            raise _Refused(f"elements are nested more than {MAX_DEPTH} deep")
+            raise _RefusedError(f"elements are nested more than {MAX_DEPTH} deep")
         element = Element(tag, attributes, first_line + parser.CurrentLineNumber)
         (stack[-1].children if stack else root).append(element)
         stack.append(element)
@@ -105,7 +105,7 @@ def read_xml(path: Path, findings: list[Finding]) -> Element | None:
             stack[-1].text += data
 
     def entity(*_: object) -> None:
-        raise _Refused("the file declares XML entities, which model files have no use for")
+        raise _RefusedError("the file declares XML entities, which model files have no use for")
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -122,7 +122,7 @@ def read_xml(path: Path, findings: list[Finding]) -> Element | None:
             )
         )
         return None
-    except _Refused as error:
+    except _RefusedError as error:
         line = first_line + parser.CurrentLineNumber
         findings.append(Finding(str(error), "remove it", str(path), line))
         return None

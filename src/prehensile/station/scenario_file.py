@@ -11,6 +11,8 @@ lists (``directives`` above all) and scalars are replaced. Both as in Drake's ha
 """
 
 import dataclasses as dc
+import functools
+import operator
 import typing
 from collections.abc import Mapping
 from importlib.resources import files
@@ -21,20 +23,11 @@ from pydrake.common.yaml import yaml_dump, yaml_load_typed
 
 from prehensile.errors import Finding, InputError
 from prehensile.models.packages import find_packages
+from prehensile.station.drivers import driver_types
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_check import check_scenario
 from prehensile.station.schema import check
 from prehensile.yaml_lines import Node, close_to, merge, read_yaml, read_yaml_file
-
-
-try:
-    from prehensile.station.drivers import driver_types
-except ImportError:  # until the registry is there
-
-    def driver_types() -> dict[str, type]:
-        from pydrake.manipulation import IiwaDriver, SchunkWsgDriver, ZeroForceDriver
-
-        return {t.__name__: t for t in (IiwaDriver, SchunkWsgDriver, ZeroForceDriver)}
 
 
 def list_scenarios() -> list[str]:
@@ -201,7 +194,7 @@ def _schema() -> dict[str, Any]:
     """The types of a scenario's keys, drivers by the tags that the driver registry knows."""
     schema = typing.get_type_hints(Scenario)
     del schema["file"]
-    schema["model_drivers"] = dict[str, typing.Union[tuple(driver_types().values())]]
+    schema["model_drivers"] = dict[str, functools.reduce(operator.or_, driver_types().values())]
     return schema
 
 
