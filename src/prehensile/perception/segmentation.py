@@ -10,20 +10,26 @@ def convex_segments(
     cloud: Cloud,
     voxel_size: float,
     *,
-    max_concavity: float = np.deg2rad(15.0),
+    max_concavity: float = np.deg2rad(10.0),
+    max_step: float = 0.6,
     min_points: int = 12,
 ) -> NDArray[np.int64]:
-    """Labels pieces of the cloud that are connected without a concave edge.
+    """Labels pieces of the cloud that are connected without a concave edge or a step.
 
     Household objects are mostly convex and meet their neighbours in concave edges, so points in
     adjacent voxels belong together if the surface between them is flat or convex (Stein,
     Schoeler, Papon and Woergoetter, "Object Partitioning using Local Convexity", CVPR 2014).
+    Voxels on the edge itself average both sides and would bridge it; so pieces are first grown
+    without any point that has a concave edge or a step beside it, and such points then join the
+    piece next to them.
 
     Args:
         cloud: one point per voxel, as :func:`prehensile.perception.fuse_depth_images` gives.
         voxel_size: edge of those voxels [m].
-        max_concavity: two adjacent points are joined if their normals turn toward each other by
-            less than this [rad].
+        max_concavity: two adjacent points are apart if their normals turn toward each other by
+            more than this within a voxel's length [rad].
+        max_step: two adjacent points with like normals are apart if they lie further from each
+            other along the normal than this [voxels].
         min_points: smaller pieces are labelled -1.
 
     Returns:
@@ -34,19 +40,34 @@ def convex_segments(
         return np.zeros(0, dtype=np.int64)
     i, j = _adjacent_pairs(cloud.points, voxel_size)
     d = cloud.points[j] - cloud.points[i]
-    d /= np.linalg.norm(d, axis=1, keepdims=True) + 1e-12
     n_i, n_j = cloud.normals[i], cloud.normals[j]
-    # Convex: going from i to j the normal leans forward, so (n_j - n_i) . d >= 0.
-    bend = np.sum((n_j - n_i) * d, axis=1)
-    apart = np.linalg.norm(n_j - n_i, axis=1)
-    same = (bend > -2.0 * np.sin(0.5 * max_concavity)) & (apart < 1.9)
-    labels = _components(n, i[same], j[same])
-    _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
+    turn = n_j - n_i
+    angle = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(turn, axis=1), 1.0))
+    # Convex: going from i to j the normal leans forward, so turn . d >= 0. Points of adjacent
+    # voxels can be very near each other; then direction means little.
+    length = np.maximum(np.linalg.norm(d, axis=1), 0.5 * voxel_size)
+    concave = np.sum(turn * d, axis=1) < -2 * np.sin(0.5 * max_concavity) * length
+    height = np.abs(np.sum((n_i + n_j) * d, axis=1)) / 2
+    step = (height > max_step * voxel_size) & (angle < np.deg2rad(70))
+    opposite = angle > np.deg2rad(145)  # the two faces of a sheet
+
+    edge = np.zeros(n, dtype=bool)
+    edge[i[concave | step]] = True
+    edge[j[concave | step]] = True
+    joined = ~(concave | step | opposite)
+    smooth = joined & ~edge[i] & ~edge[j]
+    root = _components(n, i[smooth], j[smooth])
+    _, inverse, count = np.unique(root, return_inverse=True, return_counts=True)
     order = np.argsort(-count, kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     rank[count < min_points] = -1
-    return rank[inverse]
+    labels = rank[inverse]
+    i, j = np.concatenate([i[joined], j[joined]]), np.concatenate([j[joined], i[joined]])
+    for _ in range(2):  # an edge is two voxels wide
+        take = (labels[i] < 0) & (labels[j] >= 0)
+        labels[i[take]] = labels[j[take]]
+    return labels
 
 
 def _adjacent_pairs(
