@@ -85,29 +85,17 @@ class Panel:
             max_width: mm.
             angle: degrees, counter-clockwise.
         """
-        trial = ImageFont.load_default(100.0)
-        bold = 100.0 * weight
-        left, top, right, bottom = trial.getbbox("H")
-        cap = (bottom - top + 2.0 * bold) / 100.0
-        left, _, right, _ = trial.getbbox(words)
-        wide = (right - left + 2.0 * bold) / 100.0
-        size = self._scale * min(height / cap, max_width / wide)
-        font = ImageFont.load_default(size)
+        unit = ImageFont.load_default(100.0)
+        _, top, _, bottom = unit.getbbox("H")
+        cap = (bottom - top) / 100.0 + 2.0 * weight
+        gap = 1.3 * weight + 0.02  # bolder letters need more room between them
+        wide = sum(unit.getlength(letter) for letter in words) / 100.0 + gap * (len(words) - 1)
+        size = self._scale * min(height / cap, max_width / (wide + 2.0 * weight))
         stroke = max(0, round(size * weight))
         edge = round(size * 0.07) if outline is not None else 0
-        # Drawn as a mask on its own sheet, so that it can be turned.
-        room = round(size * wide + 2 * (stroke + edge)) + 8, round(1.6 * size + 2 * edge) + 8
         layers = [(outline, stroke + edge)] if outline is not None else []
         for ink, thickness in [*layers, (color, stroke)]:
-            mask = Image.new("L", room, 0)
-            # Centred on the capitals, not on the line with its descenders.
-            _, cap_top, _, cap_bottom = font.getbbox("H")
-            left, _, right, _ = font.getbbox(words)
-            origin = (
-                (room[0] - (left + right)) / 2.0,
-                (room[1] - (cap_top + cap_bottom)) / 2.0,
-            )
-            ImageDraw.Draw(mask).text(origin, words, fill=255, font=font, stroke_width=thickness)
+            mask = _letters(words, size, wide * size, gap * size, thickness)
             if angle:
                 mask = mask.rotate(angle, expand=True, resample=Image.Resampling.BICUBIC)
             corner = (
@@ -152,18 +140,6 @@ class Panel:
         picture = Image.fromarray(pixels, "RGB")
         self._image.paste(picture.resize(self._image.size, Image.Resampling.BICUBIC))
 
-    def place(self, other: "Panel", corner: Sequence[float]) -> None:
-        """Lays another panel on this one, its upper left corner at ``corner`` mm."""
-        self._image.paste(
-            other._image, (round(corner[0] * self._scale), round(corner[1] * self._scale))
-        )
-
-    def turned(self) -> "Panel":
-        """A copy turned by half a turn."""
-        copy = Panel(self.width, self.height)
-        copy._image.paste(self._image.transpose(Image.Transpose.ROTATE_180))
-        return copy
-
     def png(self, colors: int = 64) -> bytes:
         """The panel as a PNG file with a palette of at most ``colors`` colours."""
         size = (
@@ -178,6 +154,19 @@ class Panel:
 
     def _pixels(self, box: Box) -> list[float]:
         return [v * self._scale for v in box]
+
+
+def _letters(words: str, size: float, wide: float, gap: float, thickness: int) -> Image.Image:
+    """A mask, in pixels, with the letters set ``gap`` apart and centred on their capitals."""
+    font = ImageFont.load_default(size)
+    _, top, _, bottom = font.getbbox("H")
+    mask = Image.new("L", (round(wide) + 4 * thickness + 8, round(1.6 * size) + 4 * thickness), 0)
+    draw = ImageDraw.Draw(mask)
+    x, y = (mask.width - wide) / 2.0, (mask.height - (top + bottom)) / 2.0
+    for letter in words:
+        draw.text((x, y), letter, fill=255, font=font, stroke_width=thickness)
+        x += font.getlength(letter) + gap
+    return mask
 
 
 def atlas(size: ArrayLike, faces: Mapping[str, Panel], paper: Color = "white") -> bytes:

@@ -68,14 +68,23 @@ def ring(radius: float, count: int, z: float, phase: float = 0.0) -> np.ndarray:
     )
 
 
+def prism(radius: float, count: int) -> tuple[float, float]:
+    """Corner and flat radius of a prism with ``count`` sides that stands for a round wall.
+
+    The wall lies midway, so that neither is off by more than half of their difference.
+    """
+    half = 0.5 * radius * (1.0 - np.cos(_PI / count))
+    corner = radius + half
+    return corner, (corner - BALL) * np.cos(_PI / count) + BALL
+
+
 def can_collisions(radius: float, height: float, count: int = 12, **contact: float) -> list[Collision]:
     """An upright can about the origin on two rings of ``count`` balls."""
-    # Inscribed in the prism that the balls span, so that the can does not roll.
-    flat = (radius - BALL) * np.cos(_PI / count) + BALL
+    corner, flat = prism(radius, count)
     return [
         hull("hull", "cylinder", [flat - INSET, height - 2.0 * INSET], **contact),
-        *balls(ring(radius, count, -0.5 * height), **contact),
-        *balls(ring(radius, count, 0.5 * height), start=count, **contact),
+        *balls(ring(corner, count, -0.5 * height), **contact),
+        *balls(ring(corner, count, 0.5 * height), start=count, **contact),
     ]
 
 

@@ -54,7 +54,7 @@ def _collisions() -> list[Collision]:
     raw = sweep(_center(angle), section, _thickness(angle))
     shift = -0.5 * np.sum(raw.bounds(), axis=0)
     centers = _center(BALL_ANGLES) + shift
-    radii = np.round(RADIUS * _thickness(BALL_ANGLES), 5)
+    radii = np.round(1.03 * RADIUS * _thickness(BALL_ANGLES), 5)
     shapes = [
         hull(f"ball_{k}", "sphere", [radius], center, mu=0.6, resolution=0.006)
         for k, (center, radius) in enumerate(zip(centers, radii, strict=True))

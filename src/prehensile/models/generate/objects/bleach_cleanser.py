@@ -14,7 +14,7 @@ A, B, HEIGHT = 0.0325, 0.049, 0.250  # half thickness (x), half width (y), m
 SHOULDER, NECK = 0.165, 0.217  # heights above the base, m
 NECK_Y, NECK_RADIUS, CAP_RADIUS = -0.014, 0.015, 0.019
 WHITE, BLUE, AQUA, RED = "#f4f4f0", "#12409c", "#25a9e0", "#d5281f"
-SEGMENTS = 96
+SEGMENTS = 72
 
 
 def _smooth(x: np.ndarray | float, low: float, high: float) -> np.ndarray:
@@ -30,7 +30,7 @@ def _body() -> Mesh:
         (full * (1.0 - 0.12 * (1.0 - np.sin(t))), 0.006 * (1.0 - np.cos(t)))
         for t in np.linspace(0.0, np.pi / 2.0, 6)
     ]
-    levels += [(full, z) for z in np.linspace(0.02, SHOULDER, 22)]
+    levels += [(full, z) for z in np.linspace(0.03, SHOULDER, 18)]
     for t in np.linspace(0.0, np.pi / 2.0, 13)[1:]:
         share = np.cos(t) ** 0.85
         levels.append((share * full + (1.0 - share) * neck, SHOULDER + (NECK - SHOULDER) * np.sin(t)))

@@ -21,7 +21,7 @@ def generate(folder: Path) -> None:
     bend = np.linspace(-1.0, 1.0, 30)
     for x in (0.5 * w, 0.0, w):
         paper.text(
-            "CHIPS", (x, 0.27 * h), height=30, max_width=0.36 * w, color=YELLOW, weight=0.09
+            "CHIPS", (x, 0.27 * h), height=30, max_width=0.37 * w, color=YELLOW, weight=0.09
         )
         for k in range(4):
             y = 0.52 * h + 20.0 * k

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prehensile.models.generate.objects._contact import INSET, balls, hull, ring
+from prehensile.models.generate.objects._contact import INSET, balls, hull, prism, ring
 from prehensile.models.generate.objects._object import HouseholdObject, write_object
 from prehensile.models.generate.sdf_model import Collision
 from prehensile.models.shapes import Material, Mesh, Part, lathe, merge, superellipse, sweep
@@ -60,8 +60,8 @@ def _shift() -> np.ndarray:
 
 def _collisions() -> list[Collision]:
     shift = _shift()
-    flat = (RADIUS - 0.001) * np.cos(np.pi / SIDES) + 0.001  # inscribed, as in can_collisions
-    outer, inner = flat - INSET, RADIUS - WALL - 0.001
+    corner, flat = prism(RADIUS, SIDES)
+    outer, inner = flat - INSET, RADIUS - WALL - 0.0005
     width = 2.0 * outer * np.tan(np.pi / SIDES)
     shapes = [
         hull(
@@ -82,8 +82,8 @@ def _collisions() -> list[Collision]:
         pose = (*(0.5 * (knots[k] + knots[k + 1])), roll, 0.0, 0.0)
         size = [GRIP[1], float(np.linalg.norm(way))]
         shapes.append(hull(f"handle_{k}", "capsule", size, pose, resolution=0.004))
-    low = ring(RADIUS, SIDES, -0.5 * HEIGHT) + [0.0, shift[1], 0.0]
-    high = ring(RADIUS, SIDES, 0.5 * HEIGHT) + [0.0, shift[1], 0.0]
+    low = ring(corner, SIDES, -0.5 * HEIGHT) + [0.0, shift[1], 0.0]
+    high = ring(corner, SIDES, 0.5 * HEIGHT) + [0.0, shift[1], 0.0]
     return [*shapes, *balls(low), *balls(high, start=SIDES)]
 
 
@@ -96,7 +96,7 @@ def _glaze() -> Panel:
     for y in (0.26, 0.76):
         paper.rect((0, (y - 0.015) * wall, w, (y + 0.015) * wall), NAVY)
     for x in (0.5 * w, 0.0, w):
-        paper.text("COFFEE", (x, 0.51 * wall), height=16, max_width=0.32 * w, color=NAVY, weight=0.1)
+        paper.text("COFFEE", (x, 0.51 * wall), height=16, max_width=0.29 * w, color=NAVY, weight=0.1)
     for k in range(8):
         paper.ellipse(((0.25 if k < 4 else 0.75) * w + (k % 4 - 1.5) * 8, 0.51 * wall), (2.4, 2.4), BLUE)
     return paper

@@ -85,7 +85,7 @@ def _label(around: float, along: float) -> Panel:
         paper.ellipse((x, 0.60 * h), (0.17 * w, 0.25 * h), WHITE)
         paper.ellipse((x, 0.60 * h), (0.155 * w, 0.228 * h), RED)
         paper.rect((x - 0.2 * w, 0.525 * h, x + 0.2 * w, 0.675 * h), WHITE)
-        paper.text("MUSTARD", (x, 0.60 * h), height=14, max_width=0.37 * w, color=RED, weight=0.1)
+        paper.text("MUSTARD", (x, 0.60 * h), height=14, max_width=0.34 * w, color=RED, weight=0.07)
         paper.text("HOT", (x, 0.465 * h), height=10, color=WHITE, weight=0.08)
         for k in range(5):  # seeds
             paper.ellipse((x + (k - 2) * 7.0, 0.735 * h + 2.5 * (k % 2)), (2.6, 2.6), YELLOW)

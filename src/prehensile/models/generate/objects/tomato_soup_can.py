@@ -36,9 +36,9 @@ def generate(folder: Path) -> None:
     paper.rect((0, 0.48 * h, w, 0.51 * h), GOLD)
     paper.rect((0, 0.93 * h, w, h), RED)
     for x in (0.25 * w, 0.75 * w):  # at the sides of the front
-        paper.text("SOUP", (x, 0.25 * h), height=12, color=WHITE)
+        paper.text("SOUP", (x, 0.25 * h), height=9, color=GOLD)
     for x in (0.5 * w, 0.0, w):  # front, and the back in two halves
-        paper.text("TOMATO", (x, 0.25 * h), height=19, max_width=0.36 * w, color=WHITE, weight=0.08)
+        paper.text("TOMATO", (x, 0.25 * h), height=19, max_width=0.31 * w, color=WHITE, weight=0.08)
         _tomato(paper, x, 0.72 * h, 15.0)
     paper.barcode((0.25 * w - 12, 0.58 * h, 0.25 * w + 12, 0.86 * h), seed=2)
     paper.facts((0.75 * w - 13, 0.55 * h, 0.75 * w + 13, 0.90 * h), "SOUP")
