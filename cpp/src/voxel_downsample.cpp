@@ -178,7 +178,7 @@ VoxelCloud<Scalar> VoxelDownsample(const RowsView<Scalar>& points, double voxel_
 
   std::vector<Share> shares;
   shares.reserve(num_shares);
-  for (int i = 0; i < num_shares; ++i) shares.emplace_back(i, num_shares, n / 8 / num_shares);
+  for (int i = 0; i < num_shares; ++i) shares.emplace_back(i, num_shares, n / 4 / num_shares);
   const auto block_size = [n](std::size_t begin) { return std::min(kBlock, n - begin); };
   const auto quantize = [&](std::size_t begin, std::uint64_t* keys) {
     const std::size_t done =

@@ -7,75 +7,46 @@ namespace prehensile::internal::PREHENSILE_SIMD {
 namespace {
 
 using Double4 = double __attribute__((vector_size(32)));
-using Double8 = double __attribute__((vector_size(64)));
-using Int8 = std::int32_t __attribute__((vector_size(32)));
-using Long8 = std::int64_t __attribute__((vector_size(64)));
-
 template <typename Scalar>
-struct Vectors;
+struct Vector4;
 template <>
-struct Vectors<float> {
-  using Four = float __attribute__((vector_size(16)));
-  using Eight = float __attribute__((vector_size(32)));
+struct Vector4<float> {
+  using Type = float __attribute__((vector_size(16)));
 };
 template <>
-struct Vectors<double> {
-  using Four = Double4;
-  using Eight = Double8;
+struct Vector4<double> {
+  using Type = Double4;
 };
 
 bool IsFinite(double x) { return x - x == 0; }
 
-std::uint64_t Key(const std::int32_t* index) {
-  const auto field = [](std::int32_t i) { return static_cast<std::uint64_t>(i + kMaxIndex); };
-  return field(index[0]) << 42 | field(index[1]) << 21 | field(index[2]);
-}
-
 template <typename Scalar>
 std::size_t Quantize(const Scalar* points, std::size_t n, double inverse_size,
                      std::uint64_t* keys) {
-  constexpr std::size_t kPoints = 128;
-  alignas(64) std::int32_t index[3 * kPoints];
-  for (std::size_t begin = 0; begin < n; begin += kPoints) {
-    const std::size_t count = n - begin < kPoints ? n - begin : kPoints;
-    const Scalar* const x = points + 3 * begin;
-    Long8 all_valid = ~Long8{};
-    for (std::size_t i = 0; i < 3 * count; i += 8) {
-      typename Vectors<Scalar>::Eight raw{};
-      if (i + 8 <= 3 * count) {
-        __builtin_memcpy(&raw, x + i, sizeof(raw));
-      } else {
-        __builtin_memcpy(&raw, x + i, (3 * count - i) * sizeof(Scalar));
-      }
-      const Double8 t = __builtin_convertvector(raw, Double8) * inverse_size;
-      // NaN and infinity are not valid either.
-      const Long8 valid = (t >= double{-kMaxIndex}) & (t < double{kMaxIndex});
-      all_valid &= valid;
-      const Double8 clean = valid ? t : Double8{};
-      const Int8 truncated = __builtin_convertvector(clean, Int8);
-      const Long8 above = __builtin_convertvector(truncated, Double8) > clean;  // -1 where true.
-      const Int8 floor = truncated + __builtin_convertvector(above, Int8);
-      __builtin_memcpy(index + i, &floor, sizeof(floor));
-    }
-    for (std::size_t k = 0; k < count; ++k) keys[begin + k] = Key(index + 3 * k);
+  // Plain loops over flat arrays, for the compiler to vectorize at the width of the level.
+  std::uint32_t field[3 * kBlock];  // Voxel index + kMaxIndex: 21 bits if the index is in range.
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < 3 * n; ++i) {
+    double t = points[i] * inverse_size;
+    t = t < kMaxIndex ? t : kMaxIndex;  // NaN, too, ends here, and sets a 22nd bit below.
+    t = t > -kMaxIndex - 1 ? t : -kMaxIndex - 1;
+    const auto truncated = static_cast<std::int32_t>(t);
+    const std::int32_t floor = truncated - (truncated > t);
+    field[i] = static_cast<std::uint32_t>(floor + kMaxIndex);
+    bits |= field[i];
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto wide = [&](std::size_t axis) { return std::uint64_t{field[3 * k + axis]}; };
+    keys[k] = wide(0) << 42 | wide(1) << 21 | wide(2);
+  }
+  if (bits < 2 * kMaxIndex) return n;
 
-    bool clean_block = true;
-    for (int lane = 0; lane < 8; ++lane) clean_block &= all_valid[lane] != 0;
-    if (clean_block) continue;
-    for (std::size_t k = 0; k < count; ++k) {
-      bool finite = true;
-      bool valid = true;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double value = x[3 * k + axis];
-        const double t = value * inverse_size;
-        finite &= IsFinite(value);
-        valid &= t >= -kMaxIndex && t < kMaxIndex;
-      }
-      if (!finite) {
-        keys[begin + k] = kDropped;
-      } else if (!valid) {
-        return begin + k;
-      }
+  for (std::size_t k = 0; k < n; ++k) {
+    const Scalar* const p = points + 3 * k;
+    if (!(IsFinite(p[0]) & IsFinite(p[1]) & IsFinite(p[2]))) {
+      keys[k] = kDropped;
+    } else if ((field[3 * k] | field[3 * k + 1] | field[3 * k + 2]) >= 2 * kMaxIndex) {
+      return k;
     }
   }
   return n;
@@ -85,47 +56,44 @@ template <typename Scalar, bool kNormals>
 void Accumulate(const std::uint64_t* keys, std::size_t n, const Scalar* points,
                 const Scalar* normals, std::size_t begin, std::size_t total, std::uint64_t share,
                 std::uint64_t num_shares, VoxelTable* table) {
-  // First the rows and hashes of the points to add, then their places, then the sums: loops without
-  // branches on the data where that can be, and independent of each other's memory latency.
-  std::uint32_t rows[kBlock];
-  std::uint64_t hashes[kBlock];
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto product = static_cast<unsigned __int128>(HashKey(keys[k])) * num_shares;
-    rows[count] = static_cast<std::uint32_t>(k);
-    hashes[count] = static_cast<std::uint64_t>(product);
-    count += (static_cast<std::uint64_t>(product >> 64) == share) & (keys[k] != kDropped);
-  }
-
   const int shift = table->shift;
   const std::uint64_t mask = ~std::uint64_t{0} >> shift;
   std::uint32_t* const buckets = table->buckets;
   VoxelRecord* const records = table->records;
   std::uint32_t size = table->size;
-  std::uint64_t last_key = kDropped;
-  VoxelRecord* record = nullptr;
+
+  // The points of this share and their first buckets, and then the records in those, are asked for
+  // ahead of use: their places in memory are as good as random.
+  std::uint32_t mine[kBlock];
+  std::uint64_t first_bucket[kBlock];
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto product = static_cast<unsigned __int128>(HashKey(keys[k])) * num_shares;
+    mine[count] = static_cast<std::uint32_t>(k);
+    first_bucket[count] = static_cast<std::uint64_t>(product) >> shift;
+    __builtin_prefetch(&buckets[first_bucket[count]]);
+    count += (static_cast<std::uint64_t>(product >> 64) == share) & (keys[k] != kDropped);
+  }
   for (std::size_t r = 0; r < count; ++r) {
-    const std::size_t k = rows[r];
+    const std::uint32_t found = buckets[first_bucket[r]];
+    __builtin_prefetch(&records[found == kEmpty ? size : found], 1);
+  }
+
+  for (std::size_t r = 0; r < count; ++r) {
+    const std::size_t k = mine[r];
     const std::size_t row = begin + k;
     const std::uint64_t key = keys[k];
-    if (key != last_key) {
-      last_key = key;
-      std::uint64_t bucket = hashes[r] >> shift;
-      while (true) {
-        const std::uint32_t found = buckets[bucket];
-        if (found == kEmpty) {
-          buckets[bucket] = size;
-          table->first[size] = static_cast<std::uint32_t>(row);
-          record = &records[size++];
-          *record = VoxelRecord{{0, 0, 0, 0}, {0, 0, 0}, key};
-          break;
-        }
-        record = &records[found];
-        if (record->key == key) break;
-        bucket = (bucket + 1) & mask;
-      }
+    std::uint64_t bucket = first_bucket[r];
+    while (buckets[bucket] != kEmpty && records[buckets[bucket]].key != key) {
+      bucket = (bucket + 1) & mask;
     }
-    typename Vectors<Scalar>::Four raw{};
+    if (buckets[bucket] == kEmpty) {
+      buckets[bucket] = size;
+      table->first[size] = static_cast<std::uint32_t>(row);
+      records[size++] = VoxelRecord{{0, 0, 0, 0}, {0, 0, 0}, key};
+    }
+    VoxelRecord* const record = &records[buckets[bucket]];
+    typename Vector4<Scalar>::Type raw{};
     const Scalar* const x = points + 3 * row;
     if (row + 1 < total) {
       __builtin_memcpy(&raw, x, sizeof(raw));  // One number too many, replaced below.

@@ -10,8 +10,8 @@ inline constexpr std::uint64_t kDropped = ~std::uint64_t{0};
 inline constexpr std::uint32_t kEmpty = ~std::uint32_t{0};
 /// Voxel indices lie in [-kMaxIndex, kMaxIndex).
 inline constexpr int kMaxIndex = 1 << 20;
-/// Points per call of VoxelAccumulate().
-inline constexpr std::size_t kBlock = 512;
+/// Most points per call of a kernel: the records they touch fit the first-level cache.
+inline constexpr std::size_t kBlock = 256;
 
 /// Spreads a key over 64 bits. (Defined here because growing a table needs it too; `static`, so
 /// that each SIMD level has its own.)
@@ -39,7 +39,7 @@ struct VoxelTable {
   std::uint32_t size;    // Number of records.
 };
 
-/// Computes the keys of n points (3 n numbers, row per point).
+/// Computes the keys of n ≤ kBlock points (3 n numbers, row per point).
 ///
 /// @return n, or the number of the first point whose indices are out of range.
 template <typename Scalar>
