@@ -1,9 +1,8 @@
 """Scenes with household objects for the tests: a floor, a bin of boxes, two squeezing fingers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
@@ -83,26 +82,32 @@ def new_scene(time_step: float, names: Mapping[str, str]) -> Scene:
     )
     plant, _ = AddMultibodyPlant(config, builder)
     parser = Parser(plant)
-    parser.package_map().Add("prehensile", str(DATA))
+    parser.package_map().Add("prehensile", DATA)
     parser.SetAutoRenaming(True)
     bodies = {}
     for key, name in names.items():
-        (model,) = parser.AddModels(str(DATA / name / f"{name}.sdf"))
+        (model,) = parser.AddModels(DATA / name / f"{name}.sdf")
         bodies[key] = plant.GetBodyByName("base_link", model)
     return Scene(builder, plant, bodies)
 
 
-def add_wall(plant: MultibodyPlant, name: str, size: np.ndarray, center: np.ndarray) -> None:
+def add_wall(
+    plant: MultibodyPlant, name: str, size: Sequence[float], center: Sequence[float]
+) -> None:
     """A rigid box fixed to the world."""
     plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform(center), Box(*size), name, rigid_properties()
+        plant.world_body(),
+        RigidTransform(p=list(center)),
+        Box(*size),
+        name,
+        rigid_properties(),
     )
 
 
 def floor_scene(time_step: float, names: Mapping[str, str]) -> Scene:
     """Objects above a thick rigid floor whose top is z = 0."""
     scene = new_scene(time_step, names)
-    add_wall(scene.plant, "floor", np.array([4.0, 4.0, 1.0]), np.array([0.0, 0.0, -0.5]))
+    add_wall(scene.plant, "floor", [4.0, 4.0, 1.0], [0.0, 0.0, -0.5])
     scene.plant.Finalize()
     return scene
 
@@ -111,15 +116,19 @@ def bin_scene(time_step: float, names: Mapping[str, str]) -> Scene:
     """Objects above a bin with an interior of 0.56 x 0.38 x 0.16 m, its floor at z = 0."""
     scene = new_scene(time_step, names)
     x, y, z, thick = 0.56, 0.38, 0.16, 0.05
-    add_wall(scene.plant, "floor", np.array([x + 1, y + 1, 0.1]), np.array([0, 0, -0.05]))
+    add_wall(scene.plant, "floor", [x + 1, y + 1, 0.1], [0, 0, -0.05])
     for sign in (-1.0, 1.0):
         add_wall(
-            scene.plant, f"x{sign}", np.array([thick, y + 2 * thick, z]),
-            np.array([sign * (x + thick) / 2, 0, z / 2]),
+            scene.plant,
+            f"x{sign}",
+            [thick, y + 2 * thick, z],
+            [sign * (x + thick) / 2, 0, z / 2],
         )
         add_wall(
-            scene.plant, f"y{sign}", np.array([x + 2 * thick, thick, z]),
-            np.array([0, sign * (y + thick) / 2, z / 2]),
+            scene.plant,
+            f"y{sign}",
+            [x + 2 * thick, thick, z],
+            [0, sign * (y + thick) / 2, z / 2],
         )
     scene.plant.Finalize()
     return scene

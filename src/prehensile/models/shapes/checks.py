@@ -57,7 +57,9 @@ def array(name: str, value: ArrayLike, columns: int, min_rows: int = 1) -> np.nd
             )
         )
     if not np.isfinite(result).all():
-        raise InputError(Finding(f"{name} contains NaN or infinity", "give finite numbers", key=name))
+        raise InputError(
+            Finding(f"{name} contains NaN or infinity", "give finite numbers", key=name)
+        )
     return result
 
 

@@ -83,8 +83,8 @@ def write_atomically(path: Path, content: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(content)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        Path(temporary).chmod(0o644)  # mkstemp gives 0600
+        Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
@@ -181,9 +181,7 @@ class _Writer:
                 {"uri": _PNG + base64.b64encode(png).decode(), "mimeType": "image/png"}
                 for png in self._images
             ]
-            content["textures"] = [
-                {"sampler": 0, "source": k} for k in range(len(self._images))
-            ]
+            content["textures"] = [{"sampler": 0, "source": k} for k in range(len(self._images))]
         return json.dumps(content, indent=1) + "\n"
 
     def _material_json(self, material: Material) -> dict[str, Any]:
@@ -209,8 +207,7 @@ def read_gltf(path: str | Path) -> list[Part]:
         content = json.loads(path.read_text())
         blob = base64.b64decode(content["buffers"][0]["uri"].removeprefix(_BIN))
         images = [
-            base64.b64decode(image["uri"].removeprefix(_PNG))
-            for image in content.get("images", [])
+            base64.b64decode(image["uri"].removeprefix(_PNG)) for image in content.get("images", [])
         ]
         return [
             _read_part(content, blob, images, primitive)

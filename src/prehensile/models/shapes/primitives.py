@@ -76,7 +76,9 @@ def rounded_box(size: ArrayLike, radius: float, segments: int = 4) -> Mesh:
     n = len(slopes)
     i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
     a = (i * n + j)[:-1, :-1].reshape(-1)
-    quads = np.stack([np.column_stack([a, a + n, a + n + 1]), np.column_stack([a, a + n + 1, a + 1])])
+    quads = np.stack(
+        [np.column_stack([a, a + n, a + n + 1]), np.column_stack([a, a + n + 1, a + 1])]
+    )
     faces = quads.reshape(-1, 3)
 
     parts = []
@@ -121,7 +123,7 @@ def cylinder(radius: float, length: float, segments: int = 48, *, rounding: floa
         side = [*lower, *(lower * [1.0, -1.0])[::-1]]
         if rounding == 0.5 * length:
             del side[len(lower)]
-    profile = [p for p in ([0.0, -top], *side, [0.0, top])]
+    profile = [[0.0, -top], *side, [0.0, top]]
     if rounding == radius:
         profile = profile[1:-1]
     return lathe(profile, segments)

@@ -117,9 +117,7 @@ def extrude(
     if bevel == 0.0:
         return loft([points, points], [0.0, depth], crease=crease)
     inner = offset(points, -bevel)
-    return loft(
-        [inner, points, points, inner], [0.0, bevel, depth - bevel, depth], crease=crease
-    )
+    return loft([inner, points, points, inner], [0.0, bevel, depth - bevel, depth], crease=crease)
 
 
 def skin(
@@ -217,5 +215,3 @@ def _minimal_turn_frames(curve: np.ndarray, up: np.ndarray) -> tuple[np.ndarray,
         y -= tangents[k + 1] * (y @ tangents[k + 1])
         y_axes.append(y / np.linalg.norm(y))
     return np.cross(y_axes, tangents), np.array(y_axes)
-
-

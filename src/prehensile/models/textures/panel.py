@@ -121,13 +121,13 @@ class Panel:
         wide, high = x1 - x0, y1 - y0
         self.rect(box, "white")
         self.frame(box, "black", 0.6)
-        self.text(
-            title, ((x0 + x1) / 2, y0 + 0.12 * high), height=0.1 * high, max_width=0.9 * wide
-        )
+        self.text(title, ((x0 + x1) / 2, y0 + 0.12 * high), height=0.1 * high, max_width=0.9 * wide)
         rows = 7
         for k in range(rows):
             y = y0 + high * (0.24 + 0.74 * k / rows)
-            self.rect((x0 + 0.06 * wide, y, x1 - 0.06 * wide, y + (0.9 if k == 0 else 0.3)), "black")
+            self.rect(
+                (x0 + 0.06 * wide, y, x1 - 0.06 * wide, y + (0.9 if k == 0 else 0.3)), "black"
+            )
             y += high * 0.42 / rows
             length = (0.52, 0.38, 0.6, 0.45, 0.3, 0.5, 0.42)[k]
             thick = 0.14 * high / rows

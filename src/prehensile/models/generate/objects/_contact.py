@@ -10,45 +10,59 @@ A round can lies on its balls like a prism, which keeps it from rolling about fo
 no rolling friction. Its hull is drawn in to that prism.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prehensile.models.generate.sdf_model import Collision, Contact, Pose, Shape
+from prehensile.models.generate.sdf_model import Collision, Contact, Shape
 
 BALL = 0.001  # m, radius of the balls at corners and rims
 INSET = 0.0003  # m, from the surface of the balls to that of the hulls
-_PI = np.pi
+FRICTION = 0.6
 
 
-def surface(mu: float = 0.6, resolution: float = 0.01) -> Contact:
-    """A dry rigid surface; ``resolution`` is the edge length of curved hulls' meshes, m."""
-    return Contact(mu=mu, hydroelastic="rigid", resolution=resolution, relaxation_time=0.02)
+def hull(
+    name: str,
+    kind: str,
+    size: ArrayLike,
+    pose: ArrayLike = (),
+    *,
+    mu: float = FRICTION,
+    resolution: float = 0.01,
+) -> Collision:
+    """A rigid shape.
+
+    Args:
+        name: of the collision geometry.
+        kind: as `sdf_model.Shape` has it.
+        size: as `sdf_model.Shape` has it, m.
+        pose: x, y, z, roll, pitch, yaw in the link; it may stop early, the rest being zero.
+        mu: coefficient of friction.
+        resolution: edge length of the hydroelastic mesh of a curved shape, m.
+    """
+    full = np.zeros(6)
+    given = np.asarray(pose, dtype=float)
+    full[: len(given)] = given
+    x, y, z, roll, pitch, yaw = full
+    contact = Contact(mu=mu, hydroelastic="rigid", resolution=resolution, relaxation_time=0.02)
+    shape = Shape(kind, tuple(float(v) for v in np.asarray(size)))
+    return Collision(name, shape, (x, y, z, roll, pitch, yaw), contact)
 
 
-def hull(name: str, kind: str, size: Sequence[float], pose: Sequence[float] = (), **contact: float) -> Collision:
-    """A hull; the pose may stop at any number of its six values, the rest being zero."""
-    full = tuple(float(v) for v in pose) + (0.0,) * (6 - len(pose))
-    place: Pose = (full[0], full[1], full[2], full[3], full[4], full[5])
-    return Collision(name, Shape(kind, tuple(float(v) for v in size)), place, surface(**contact))
-
-
-def balls(points: ArrayLike, *, start: int = 0, radius: float = BALL, **contact: float) -> list[Collision]:
-    """Balls with their centres at the points (N, 3)."""
+def balls(points: ArrayLike, *, start: int = 0, mu: float = FRICTION) -> list[Collision]:
+    """Balls with their centres at the points (N, 3), numbered from ``start``."""
     return [
-        hull(f"ball_{start + k}", "sphere", [radius], point, resolution=radius, **contact)
+        hull(f"ball_{start + k}", "sphere", [BALL], point, mu=mu, resolution=BALL)
         for k, point in enumerate(np.asarray(points, dtype=float).reshape(-1, 3))
     ]
 
 
-def box_collisions(size: ArrayLike, **contact: float) -> list[Collision]:
+def box_collisions(size: ArrayLike, *, mu: float = FRICTION) -> list[Collision]:
     """A box about the origin on eight balls."""
     extents = np.asarray(size, dtype=float)
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     return [
-        hull("hull", "box", extents - 2.0 * INSET, **contact),
-        *balls(signs * (extents / 2.0 - BALL), **contact),
+        hull("hull", "box", extents - 2.0 * INSET, mu=mu),
+        *balls(signs * (extents / 2.0 - BALL), mu=mu),
     ]
 
 
@@ -57,7 +71,7 @@ def ring(radius: float, count: int, z: float, phase: float = 0.0) -> np.ndarray:
 
     ``z`` is the height of the plane that the balls touch with their far side from z = 0.
     """
-    angle = phase + 2.0 * _PI * np.arange(count) / count
+    angle = phase + 2.0 * np.pi * np.arange(count) / count
     level = z - np.sign(z) * BALL
     return np.column_stack(
         [
@@ -73,18 +87,18 @@ def prism(radius: float, count: int) -> tuple[float, float]:
 
     The wall lies midway, so that neither is off by more than half of their difference.
     """
-    half = 0.5 * radius * (1.0 - np.cos(_PI / count))
+    half = 0.5 * radius * (1.0 - np.cos(np.pi / count))
     corner = radius + half
-    return corner, (corner - BALL) * np.cos(_PI / count) + BALL
+    return corner, (corner - BALL) * np.cos(np.pi / count) + BALL
 
 
-def can_collisions(radius: float, height: float, count: int = 12, **contact: float) -> list[Collision]:
+def can_collisions(radius: float, height: float, count: int = 12) -> list[Collision]:
     """An upright can about the origin on two rings of ``count`` balls."""
     corner, flat = prism(radius, count)
     return [
-        hull("hull", "cylinder", [flat - INSET, height - 2.0 * INSET], **contact),
-        *balls(ring(corner, count, -0.5 * height), **contact),
-        *balls(ring(corner, count, 0.5 * height), start=count, **contact),
+        hull("hull", "cylinder", [flat - INSET, height - 2.0 * INSET]),
+        *balls(ring(corner, count, -0.5 * height)),
+        *balls(ring(corner, count, 0.5 * height), start=count),
     ]
 
 
@@ -92,10 +106,10 @@ def octagon(a: float, b: float, flat_a: float, flat_b: float, z: float) -> np.nd
     """(8, 3) centres of balls at the corners of an octagon with sides along x and y.
 
     Args:
-        a: half extent along x; b along y (outside of the balls).
-        flat_a: half length of the sides along x (outside of the balls); flat_b along y.
-        b: see a.
-        flat_b: see flat_a.
+        a: half extent along x, outside of the balls.
+        b: half extent along y.
+        flat_a: half length of the two sides that run along x.
+        flat_b: half length of the two sides that run along y.
         z: height of the plane that the balls touch with their far side from z = 0.
     """
     inner = [

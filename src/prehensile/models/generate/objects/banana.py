@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prehensile.models.generate.objects._contact import balls, hull
+from prehensile.models.generate.objects._contact import hull
 from prehensile.models.generate.objects._object import HouseholdObject, write_object
 from prehensile.models.generate.sdf_model import Collision
 from prehensile.models.shapes import Material, Mesh, Part, sweep

@@ -7,7 +7,16 @@ import numpy as np
 from prehensile.models.generate.objects._contact import INSET, balls, hull, octagon, ring
 from prehensile.models.generate.objects._object import HouseholdObject, write_object
 from prehensile.models.generate.sdf_model import Collision
-from prehensile.models.shapes import Material, Mesh, Part, circle, extrude, lathe, loft, superellipse
+from prehensile.models.shapes import (
+    Material,
+    Mesh,
+    Part,
+    circle,
+    extrude,
+    lathe,
+    loft,
+    superellipse,
+)
 from prehensile.models.textures import Panel
 
 A, B, HEIGHT = 0.0325, 0.049, 0.250  # half thickness (x), half width (y), m
@@ -25,7 +34,7 @@ def _smooth(x: np.ndarray | float, low: float, high: float) -> np.ndarray:
 def _body() -> Mesh:
     """A slab with a rounded base; above, the side opposite to the neck is pinched as a grip."""
     full = superellipse(A, B, 3.5, SEGMENTS)
-    neck = circle(NECK_RADIUS, SEGMENTS) + [0.0, NECK_Y]
+    neck = circle(NECK_RADIUS, SEGMENTS) + np.array([0.0, NECK_Y])
     levels = [
         (full * (1.0 - 0.12 * (1.0 - np.sin(t))), 0.006 * (1.0 - np.cos(t)))
         for t in np.linspace(0.0, np.pi / 2.0, 6)
@@ -33,7 +42,9 @@ def _body() -> Mesh:
     levels += [(full, z) for z in np.linspace(0.03, SHOULDER, 18)]
     for t in np.linspace(0.0, np.pi / 2.0, 13)[1:]:
         share = np.cos(t) ** 0.85
-        levels.append((share * full + (1.0 - share) * neck, SHOULDER + (NECK - SHOULDER) * np.sin(t)))
+        levels.append(
+            (share * full + (1.0 - share) * neck, SHOULDER + (NECK - SHOULDER) * np.sin(t))
+        )
     levels.append((neck, NECK + 0.006))
     outlines, heights = [], []
     for outline, z in levels:
@@ -64,13 +75,16 @@ def _collisions() -> list[Collision]:
     flat_a, flat_b = 0.74 * A, 0.7 * B
     low, tall = 0.5 * (base + waist), waist - base
     upper, rise = 0.5 * (waist + top), top - waist
+    cap = ring(CAP_RADIUS, 6, 0.5 * HEIGHT, np.pi / 6.0)
     grip = 0.42 * A  # half thickness of the pinched side
     return [
         hull("hull_broad", "box", [2 * A - gap, 2 * flat_b - gap, tall - gap], (0, 0, low)),
         hull("hull_narrow", "box", [2 * flat_a - gap, 2 * B - gap, tall - gap], (0, 0, low)),
         hull("hull_front", "box", [2 * A - gap, 0.027, rise], (0, -0.0215, upper)),
         hull("hull_edge", "box", [2 * flat_a - gap, 0.02, rise], (0, -B + INSET + 0.01, upper)),
-        hull("hull_grip", "box", [2 * grip, B - INSET + 0.008, rise], (0, 0.5 * (B - 0.008), upper)),
+        hull(
+            "hull_grip", "box", [2 * grip, B - INSET + 0.008, rise], (0, 0.5 * (B - 0.008), upper)
+        ),
         hull("hull_shoulder", "box", [0.044, 0.056, 0.022], (0, -0.012, top + 0.011)),
         hull("hull_cap", "cylinder", [0.9 * CAP_RADIUS, 0.052], (0, NECK_Y, 0.5 * HEIGHT - 0.0263)),
         *balls(octagon(A, B, flat_a, flat_b, base)),
@@ -90,7 +104,7 @@ def _collisions() -> list[Collision]:
             ],
             start=12,
         ),
-        *balls(ring(CAP_RADIUS, 6, 0.5 * HEIGHT, np.pi / 6.0) + [0.0, NECK_Y, 0.0], start=16),
+        *balls(cap + np.array([0.0, NECK_Y, 0.0]), start=16),
     ]
 
 
@@ -101,7 +115,9 @@ def _label(around: float, along: float) -> Panel:
     paper.rect((0, 0.545 * h, w, 0.565 * h), AQUA)
     paper.rect((0, 0.925 * h, w, 0.945 * h), AQUA)
     for x in (0.5 * w, 0.0, w):
-        paper.text("BLEACH", (x, 0.66 * h), height=17, max_width=0.36 * w, color="white", weight=0.1)
+        paper.text(
+            "BLEACH", (x, 0.66 * h), height=17, max_width=0.36 * w, color="white", weight=0.1
+        )
         for k in range(8):  # a sparkle
             turn = 2.0 * np.pi * k / 8.0
             reach = 15.0 if k % 2 == 0 else 8.0

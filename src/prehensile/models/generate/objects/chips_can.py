@@ -1,7 +1,8 @@
 """Chips can: a tall purple tube with a plastic lid."""
 
-import numpy as np
 from pathlib import Path
+
+import numpy as np
 
 from prehensile.models.generate.objects._cans import label, tin
 from prehensile.models.generate.objects._contact import can_collisions
@@ -20,9 +21,7 @@ def generate(folder: Path) -> None:
     paper.rect((0, 0.96 * h, w, h), YELLOW)
     bend = np.linspace(-1.0, 1.0, 30)
     for x in (0.5 * w, 0.0, w):
-        paper.text(
-            "CHIPS", (x, 0.27 * h), height=30, max_width=0.37 * w, color=YELLOW, weight=0.09
-        )
+        paper.text("CHIPS", (x, 0.27 * h), height=30, max_width=0.37 * w, color=YELLOW, weight=0.09)
         for k in range(4):
             y = 0.52 * h + 20.0 * k
             upper = np.column_stack([x + 30 * bend, y - 9 * (1 - bend**2) - 5 * bend])

@@ -27,7 +27,12 @@ def _front(panel: Panel) -> None:
     w, h = panel.width, panel.height
     panel.polygon([(0, 0.10 * h), (w, 0.02 * h), (w, 0.36 * h), (0, 0.44 * h)], YELLOW)
     panel.text(
-        "CRACKERS", (w / 2, 0.235 * h), height=27, max_width=0.9 * w, color=RED, angle=6.0,
+        "CRACKERS",
+        (w / 2, 0.235 * h),
+        height=27,
+        max_width=0.9 * w,
+        color=RED,
+        angle=6.0,
         weight=0.09,
     )
     for x, y, r in ((0.27, 0.64, 27), (0.72, 0.60, 29), (0.50, 0.80, 31)):

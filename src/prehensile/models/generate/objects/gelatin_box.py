@@ -21,9 +21,7 @@ def generate(folder: Path) -> None:
         front.text("GELATIN", (w / 2, 0.24 * h), height=15, max_width=0.88 * w, color=WHITE)
         # A wobbling moulded jelly.
         x, y = 0.63 * w, 0.90 * h
-        front.polygon(
-            [(x - 21, y), (x + 21, y), (x + 13, y - 19), (x - 13, y - 19)], DEEP
-        )
+        front.polygon([(x - 21, y), (x + 21, y), (x + 13, y - 19), (x - 13, y - 19)], DEEP)
         for k in range(5):
             front.ellipse((x + (k - 2) * 6.0, y - 18.5), (3.6, 4.0), PINK)
             front.line([(x + (k - 2) * 8.4, y), (x + (k - 2) * 5.6, y - 17)], PINK, 1.6)

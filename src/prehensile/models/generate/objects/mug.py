@@ -19,9 +19,7 @@ BLUE, WHITE, NAVY = "#2f9bd8", "#ffffff", "#10386b"
 
 def _outer() -> Mesh:
     turn = np.linspace(0.0, np.pi / 2.0, 6)
-    foot = np.column_stack(
-        [RADIUS - 0.004 + 0.004 * np.sin(turn), 0.004 - 0.004 * np.cos(turn)]
-    )
+    foot = np.column_stack([RADIUS - 0.004 + 0.004 * np.sin(turn), 0.004 - 0.004 * np.cos(turn)])
     lip = HEIGHT - 0.5 * WALL
     return lathe([(0.0, 0.0), *foot, (RADIUS, lip)], 64)
 
@@ -29,9 +27,7 @@ def _outer() -> Mesh:
 def _inner() -> Mesh:
     half = 0.5 * WALL
     lip = np.linspace(0.0, np.pi, 9)
-    rim = np.column_stack(
-        [RADIUS - half + half * np.cos(lip), HEIGHT - half + half * np.sin(lip)]
-    )
+    rim = np.column_stack([RADIUS - half + half * np.cos(lip), HEIGHT - half + half * np.sin(lip)])
     turn = np.linspace(0.0, np.pi / 2.0, 6)
     well = np.column_stack(
         [RADIUS - WALL - 0.008 * (1.0 - np.cos(turn)), FLOOR + 0.008 * (1.0 - np.sin(turn))]
@@ -65,14 +61,16 @@ def _collisions() -> list[Collision]:
     width = 2.0 * outer * np.tan(np.pi / SIDES)
     shapes = [
         hull(
-            "hull_floor", "cylinder", [inner + 0.001, FLOOR - INSET],
-            shift + [0.0, 0.0, 0.5 * (FLOOR + INSET)],
+            "hull_floor",
+            "cylinder",
+            [inner + 0.001, FLOOR - INSET],
+            shift + np.array([0.0, 0.0, 0.5 * (FLOOR + INSET)]),
         )
     ]
     for k in range(SIDES):
         turn = 2.0 * np.pi * (k + 0.5) / SIDES
         middle = 0.5 * (outer + inner)
-        place = shift + [middle * np.cos(turn), middle * np.sin(turn), 0.5 * HEIGHT]
+        place = shift + np.array([middle * np.cos(turn), middle * np.sin(turn), 0.5 * HEIGHT])
         size = [outer - inner, width, HEIGHT - 2.0 * INSET]
         shapes.append(hull(f"hull_{k}", "box", size, (*place, 0.0, 0.0, turn)))
     knots = _loop(np.array([0.1, 0.27, 0.5, 0.73, 0.9]) * np.pi) + shift
@@ -82,8 +80,8 @@ def _collisions() -> list[Collision]:
         pose = (*(0.5 * (knots[k] + knots[k + 1])), roll, 0.0, 0.0)
         size = [GRIP[1], float(np.linalg.norm(way))]
         shapes.append(hull(f"handle_{k}", "capsule", size, pose, resolution=0.004))
-    low = ring(corner, SIDES, -0.5 * HEIGHT) + [0.0, shift[1], 0.0]
-    high = ring(corner, SIDES, 0.5 * HEIGHT) + [0.0, shift[1], 0.0]
+    low = ring(corner, SIDES, -0.5 * HEIGHT) + shift * [0.0, 1.0, 0.0]
+    high = ring(corner, SIDES, 0.5 * HEIGHT) + shift * [0.0, 1.0, 0.0]
     return [*shapes, *balls(low), *balls(high, start=SIDES)]
 
 
@@ -96,9 +94,13 @@ def _glaze() -> Panel:
     for y in (0.26, 0.76):
         paper.rect((0, (y - 0.015) * wall, w, (y + 0.015) * wall), NAVY)
     for x in (0.5 * w, 0.0, w):
-        paper.text("COFFEE", (x, 0.51 * wall), height=16, max_width=0.29 * w, color=NAVY, weight=0.1)
+        paper.text(
+            "COFFEE", (x, 0.51 * wall), height=16, max_width=0.29 * w, color=NAVY, weight=0.1
+        )
     for k in range(8):
-        paper.ellipse(((0.25 if k < 4 else 0.75) * w + (k % 4 - 1.5) * 8, 0.51 * wall), (2.4, 2.4), BLUE)
+        paper.ellipse(
+            ((0.25 if k < 4 else 0.75) * w + (k % 4 - 1.5) * 8, 0.51 * wall), (2.4, 2.4), BLUE
+        )
     return paper
 
 

@@ -63,11 +63,11 @@ def _collisions() -> list[Collision]:
     return [
         hull("hull_broad", "box", [2 * A - gap, 2 * flat_b - gap, tall - gap], (0, 0, middle)),
         hull("hull_narrow", "box", [2 * flat_a - gap, 2 * B - gap, tall - gap], (0, 0, middle)),
+        hull("hull_shoulder", "box", [0.036, 0.060, 0.024], (0, 0, top + 0.012)),
         hull(
-            "hull_shoulder", "box", [0.036, 0.060, 0.024], (0, 0, top + 0.012)
-        ),
-        hull(
-            "hull_cap", "cylinder", [0.9 * CAP_RADIUS, cap_high - cap_low],
+            "hull_cap",
+            "cylinder",
+            [0.9 * CAP_RADIUS, cap_high - cap_low],
             (0, 0, 0.5 * (cap_low + cap_high)),
         ),
         hull("hull_nozzle", "cylinder", [0.006, 0.022], (0, 0, 0.5 * HEIGHT - 0.011)),

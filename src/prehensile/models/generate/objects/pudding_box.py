@@ -1,7 +1,8 @@
 """Pudding box: a small brown carton."""
 
-import numpy as np
 from pathlib import Path
+
+import numpy as np
 
 from prehensile.models.generate.objects._boxes import blank_faces, printed_box
 from prehensile.models.generate.objects._contact import box_collisions
@@ -33,9 +34,7 @@ def generate(folder: Path) -> None:
     faces["-y"].facts((4, 42, faces["-y"].width - 4, 84), "FACTS")
     for name in ("+z", "-z"):
         lid = faces[name]
-        lid.text(
-            "PUDDING", (lid.width / 2, lid.height / 2), height=15, color=CREAM, max_width=92
-        )
+        lid.text("PUDDING", (lid.width / 2, lid.height / 2), height=15, color=CREAM, max_width=92)
     part = printed_box(SIZE, faces, paper=BROWN)
     write_object(
         folder,

@@ -15,8 +15,11 @@ NAVY, AQUA, WHITE = "#0b2f6b", "#27b6c9", "#ffffff"
 def _fish(panel: Panel, x: float, y: float, length: float) -> None:
     panel.ellipse((x, y), (0.38 * length, 0.17 * length), WHITE)
     panel.polygon(
-        [(x + 0.3 * length, y), (x + 0.52 * length, y - 0.18 * length),
-         (x + 0.52 * length, y + 0.18 * length)],
+        [
+            (x + 0.3 * length, y),
+            (x + 0.52 * length, y - 0.18 * length),
+            (x + 0.52 * length, y + 0.18 * length),
+        ],
         WHITE,
     )
     panel.ellipse((x - 0.22 * length, y - 0.03 * length), (0.03 * length, 0.03 * length), NAVY)
