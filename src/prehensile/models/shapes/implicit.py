@@ -207,8 +207,10 @@ def split(mesh: Mesh, side: Field, field: Field) -> tuple[Mesh | None, Mesh | No
     first, second = len(mesh.vertices) + index.reshape(2, -1)
     tip = np.column_stack([faces[:, 0], first, second])
     rest = np.concatenate(
-        [np.column_stack([first, faces[:, 1], faces[:, 2]]),
-         np.column_stack([first, faces[:, 2], second])]
+        [
+            np.column_stack([first, faces[:, 1], faces[:, 2]]),
+            np.column_stack([first, faces[:, 2], second]),
+        ]
     )
     tip_negative = lone_sign[mixed]
     rest_negative = np.tile(~tip_negative, 2)

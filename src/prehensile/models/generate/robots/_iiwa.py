@@ -10,11 +10,13 @@ turns against the drum of the next, side by side, on the axis between them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.models.generate.robots import _iiwa_shape
 from prehensile.models.generate.sdf_model import (
     IDENTITY,
     Collision,
@@ -30,8 +32,8 @@ from prehensile.models.generate.sdf_model import (
     sdf_text,
 )
 from prehensile.models.generate.sphere_cover import cover_model
+from prehensile.models.shapes import write_gltf
 
-COLORS = ((0.93, 0.45, 0.1, 1.0), (0.72, 0.73, 0.75, 1.0))
 METAL = Contact(mu=0.4, relaxation_time=0.05)
 
 
@@ -172,7 +174,7 @@ def model(arm: Arm) -> Model:
             f"iiwa_link_{i}",
             poses[i],
             inertials[i],
-            tuple(Visual(c.name, c.shape, c.pose, COLORS[i % 2]) for c in shapes[i]),
+            (Visual("housing", Shape("mesh", uri=f"link_{i}.gltf")),),
             shapes[i],
         )
         for i in range(8)
@@ -209,6 +211,9 @@ def model(arm: Arm) -> Model:
 def write(arm: Arm, folder: Path) -> None:
     """Writes all files of an arm."""
     made = model(arm)
+    heights = [upper.pose[2] - lower.pose[2] for lower, upper in pairwise(arm.axes)]
+    for i, parts in enumerate(_iiwa_shape.links(heights, arm.drum, arm.flange)):
+        write_gltf(folder / f"link_{i}.gltf", parts)
     write_text(folder / f"{arm.name}.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.036))
     write_description(
