@@ -1,0 +1,38 @@
+"""``prehensile diagram``: draw the system diagram of a station."""
+
+import argparse
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the arguments of ``prehensile diagram``."""
+    parser.add_argument("scenario", help="a scenario file, or the name of one that ships")
+    parser.add_argument(
+        "--depth", type=int, default=1, metavar="N",
+        help="levels of blocks drawn open (default 1: the station's systems as closed blocks)",
+    )  # fmt: skip
+    parser.add_argument(
+        "-o", "--output", metavar="FILE",
+        help=".html (blocks open by click), .svg or .png (default: SCENARIO.html)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--hardware", action="store_true", help="draw the interface to a real station instead"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs ``prehensile diagram``."""
+    from pathlib import Path
+
+    from prehensile.station.build import build
+    from prehensile.station.scenario_file import load_scenario
+    from prehensile.viz.diagrams import check_arguments, save_diagram
+    from prehensile.viz.progress import progress
+
+    path = Path(args.output or f"{Path(args.scenario).stem}.html")
+    check_arguments(path, args.depth)
+    scenario = load_scenario(args.scenario)
+    with progress(f"drawing {args.scenario}"):
+        station = build(scenario, hardware=args.hardware)
+        saved = save_diagram(station, path, depth=args.depth)
+    print(saved)
+    return 0
