@@ -92,7 +92,7 @@ coordinates = hnp.arrays(
 def test_invariants(points, voxel_size):
     cloud = voxel_downsample(points, voxel_size)
     assert cloud.counts.sum() == len(points)
-    # Voxels have different indices, and a centroid lies in its voxel (up to rounding at its border).
+    # Voxels have different indices; a centroid lies in its voxel, up to rounding at the border.
     index = np.floor(points * (1 / voxel_size))
     voxels = list(dict.fromkeys(map(tuple, index)))
     assert len(cloud.points) == len(voxels)

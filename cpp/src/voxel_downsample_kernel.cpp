@@ -18,7 +18,10 @@ struct Vector4<double> {
   using Type = Double4;
 };
 
-bool IsFinite(double x) { return x - x == 0; }
+template <typename Scalar>
+bool AllFinite(const Scalar* row) {
+  return (row[0] - row[0]) + (row[1] - row[1]) + (row[2] - row[2]) == 0;
+}
 
 template <typename Scalar>
 std::size_t Quantize(const Scalar* points, std::size_t n, double inverse_size,
@@ -43,7 +46,7 @@ std::size_t Quantize(const Scalar* points, std::size_t n, double inverse_size,
 
   for (std::size_t k = 0; k < n; ++k) {
     const Scalar* const p = points + 3 * k;
-    if (!(IsFinite(p[0]) & IsFinite(p[1]) & IsFinite(p[2]))) {
+    if (!AllFinite(p)) {
       keys[k] = kDropped;
     } else if ((field[3 * k] | field[3 * k + 1] | field[3 * k + 2]) >= 2 * kMaxIndex) {
       return k;
@@ -108,7 +111,7 @@ void Accumulate(const std::uint64_t* keys, std::size_t n, const Scalar* points,
     __builtin_memcpy(record->sum, &sum, sizeof(sum));
     if constexpr (kNormals) {
       const Scalar* const v = normals + 3 * row;
-      if (IsFinite(v[0]) & IsFinite(v[1]) & IsFinite(v[2])) {
+      if (AllFinite(v)) {
         record->normal[0] += v[0];
         record->normal[1] += v[1];
         record->normal[2] += v[2];

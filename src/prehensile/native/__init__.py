@@ -14,8 +14,6 @@ from prehensile.native import _core
 
 __all__ = ["VoxelCloud", "simd_levels", "voxel_downsample"]
 
-Floats = NDArray[np.float32] | NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class VoxelCloud:
@@ -28,8 +26,8 @@ class VoxelCloud:
         counts: (V,) int32 number of input points in each voxel.
     """
 
-    points: Floats
-    normals: Floats | None
+    points: NDArray[np.floating]
+    normals: NDArray[np.floating] | None
     counts: NDArray[np.int32]
 
 
@@ -70,9 +68,7 @@ def voxel_downsample(
     normals_array = None
     if normals is not None:
         normals_array = _rows("normals", normals).astype(points_array.dtype, copy=False)
-    return VoxelCloud(
-        *_core.voxel_downsample(points_array, voxel_size, normals_array, num_threads)
-    )
+    return VoxelCloud(*_core.voxel_downsample(points_array, voxel_size, normals_array, num_threads))
 
 
 def simd_levels() -> list[str]:
@@ -83,7 +79,7 @@ def simd_levels() -> list[str]:
     return _core.simd_levels()
 
 
-def _rows(name: str, values: ArrayLike) -> Floats:
+def _rows(name: str, values: ArrayLike) -> NDArray[np.floating]:
     """Returns values as a C-contiguous (N, 3) array of float32 or float64."""
     array = np.asarray(values)
     if array.dtype not in (np.float32, np.float64):

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-def voxel_downsample[T: (np.float32, np.float64)](
-    points: NDArray[T],
+def voxel_downsample(
+    points: NDArray[np.floating],
     voxel_size: float,
-    normals: NDArray[T] | None,
+    normals: NDArray[np.floating] | None,
     num_threads: int,
     simd: str | None = None,
-) -> tuple[NDArray[T], NDArray[T] | None, NDArray[np.int32]]: ...
+) -> tuple[NDArray[np.floating], NDArray[np.floating] | None, NDArray[np.int32]]: ...
 def simd_levels() -> list[str]: ...

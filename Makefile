@@ -1,0 +1,76 @@
+# Everything here works in a fresh clone with Python 3.11 to 3.13, a C++20 compiler and make; the
+# rest comes from the package registries into .venv. PYTHON=python3.12 make demo picks another one.
+PYTHON ?= python3
+.DEFAULT_GOAL := help
+NATIVE := pyproject.toml CMakeLists.txt $(shell find cpp -name '*.cpp' -o -name '*.h' -o -name CMakeLists.txt)
+CPP := $(filter %.cpp %.h,$(NATIVE))
+RUN := .venv/bin
+PIP = $(RUN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: help demo test test-all test-cpp bench docs lint format models clean
+
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1|/' | column -t -s '|'
+
+demo: .venv/.installed  ## watch an arm clear a bin, in the browser
+	$(RUN)/prehensile demo clear-bin
+
+test: .venv/.dev  ## the fast tests
+	$(RUN)/python -m pytest -m "not slow"
+
+test-all: .venv/.dev test-cpp  ## every test
+	$(RUN)/python -m pytest
+
+test-cpp: build/cpp/.tested  ## the C++ library's own tests
+
+bench: .venv/.installed  ## our speed beside the peers', each in a virtual environment of its own
+	$(RUN)/prehensile bench
+
+docs: .venv/.docs  ## the documentation as web pages, in site/
+	$(RUN)/mkdocs build --strict
+
+lint: .venv/.dev  ## ruff, pyright, clang-format
+	$(RUN)/ruff check
+	$(RUN)/ruff format --check
+	$(RUN)/clang-format --dry-run -Werror $(CPP)
+	$(RUN)/pyright
+
+format: .venv/.dev  ## lay out all sources as `make lint` wants them
+	$(RUN)/ruff check --fix-only
+	$(RUN)/ruff format
+	$(RUN)/clang-format -i $(CPP)
+
+models: .venv/.installed  ## generate the embedded models anew
+	$(RUN)/python -m prehensile.models.generate
+
+clean:  ## remove everything that was built, .venv too
+	rm -rf .venv build dist site
+
+.venv/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
+	  || { echo "prehensile needs Python 3.11 to 3.13: make PYTHON=python3.12 ..."; exit 1; }
+	$(PYTHON) -m venv .venv
+
+# The package is installed in place: Python files count as they are, C++ is built anew when it changes.
+# The package is installed in place: Python files count as they are, C++ is built anew on change.
+.venv/.installed: .venv/bin/python $(NATIVE)
+	$(PIP) --editable .
+	@touch $@
+
+# The package is there already, so these add only what the extra names.
+.venv/.dev: .venv/.installed
+	$(PIP) 'prehensile[dev]'
+	@touch $@
+
+.venv/.docs: .venv/.installed
+	$(PIP) 'prehensile[docs]'
+	@touch $@
+
+# The C++ library by itself, as a C++ project would build it.
+build/cpp/.tested: .venv/.dev $(NATIVE)
+	$(PIP) --no-deps --upgrade --target build/eigen cmeel-eigen
+	$(RUN)/cmake -S . -B build/cpp -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(RUN)/ninja \
+	  -DCMAKE_PREFIX_PATH=$(CURDIR)/build/eigen/cmeel.prefix
+	$(RUN)/cmake --build build/cpp
+	$(RUN)/ctest --test-dir build/cpp --output-on-failure
+	@touch $@
