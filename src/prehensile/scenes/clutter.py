@@ -155,11 +155,12 @@ def drop_into_bin(
         progress((i + 1) / (len(bodies) + 2))
     _advance_to_rest(simulator, plant, context, config)
     for _ in range(config.redrops):
-        for body in outside():
+        if not (stray := outside()):
+            break
+        for body in stray:
             drop(body)
         _advance_to_rest(simulator, plant, context, config)
-    stray = outside()
-    if stray:
+    if stray := outside():
         raise InputError(
             Finding(
                 f"{len(stray)} of {len(bodies)} objects do not stay in the bin",
@@ -173,7 +174,9 @@ def drop_into_bin(
     ]
 
 
-def with_objects(directives: Sequence[ModelDirective], objects: Sequence[PlacedObject]) -> list[ModelDirective]:
+def with_objects(
+    directives: Sequence[ModelDirective], objects: Sequence[PlacedObject]
+) -> list[ModelDirective]:
     """Model directives that add placed objects to those of a station.
 
     Args:
