@@ -25,6 +25,9 @@ _DEFAULT_FORCE = 40.0  # N
 # 1 cm wide; with these it is at the limit from 2 cm on, as the real hand grips.
 _GRIP_STIFFNESS = 2000.0  # N/m
 _GRIP_DAMPING = 10.0  # N s/m
+# Inertia of motor and spindle as each finger feels it: what 80 N accelerate at a few m/s^2. Without
+# it fingers of 50 g fly back and forth under sampled control.
+_SPINDLE_MASS = 1.0  # kg, at most what the data sheet's force and acceleration give
 _FINGERS = ("left_finger_sliding_joint", "right_finger_sliding_joint")
 _STATUS_TIMEOUT = 10.0  # s to wait for the first status message
 
@@ -71,6 +74,10 @@ def _width(site: Site, state: OutputPort) -> OutputPort:
 def _simulate(site: Site) -> None:
     _limits(site)
     builder, plant, instance = site.builder, site.plant, site.instance
+    for index in plant.GetJointActuatorIndices(instance):
+        actuator = plant.get_joint_actuator(index)
+        actuator.set_default_gear_ratio(1.0)
+        actuator.set_default_rotor_inertia(_SPINDLE_MASS)
     controller = builder.AddNamedSystem(
         f"{site.name}.controller",
         SchunkWsgPositionController(
