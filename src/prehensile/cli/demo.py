@@ -41,7 +41,7 @@ def _clear_bin(args: argparse.Namespace) -> int:
     if not 1 <= args.objects <= 40:
         raise InputError(Finding("must be between 1 and 40", key="--objects"))
     _check_seed(args.seed)
-    from prehensile.tasks.clear_bin_demo import run_demo
+    from prehensile.cli.demo_clear_bin import run_demo
 
     report = run_demo(
         objects=args.objects,

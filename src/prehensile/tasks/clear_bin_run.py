@@ -3,7 +3,6 @@
 import dataclasses as dc
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 from pydrake.common.value import AbstractValue
@@ -33,7 +32,7 @@ from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario
 from prehensile.tasks.clear_bin import BinGeometry, Camera, ClearBin, ClearBinConfig, Memory
-from prehensile.tasks.report import Attempt, ClearBinReport, ObjectResult
+from prehensile.tasks.report import ClearBinReport, ObjectResult
 
 _STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C
 
@@ -86,9 +85,7 @@ class ClearBinRun:
         arm = ArmModel(world)
         cameras = [Camera(key, intrinsics(c)) for key, c in scenario.cameras.items()]
         task = ClearBin(arm, cameras, pick_bin, self._place_bin, seed=seed, config=config)
-        scenario = dc.replace(
-            scenario, directives=with_objects(scenario.directives, self.objects)
-        )
+        scenario = dc.replace(scenario, directives=with_objects(scenario.directives, self.objects))
         builder = DiagramBuilder()
         self.station: Diagram = builder.AddSystem(build(scenario, meshcat=meshcat))
         images = {f"{c.name}.depth_image": AbstractValue.Make(ImageDepth32F()) for c in cameras}
@@ -107,13 +104,9 @@ class ClearBinRun:
             "wsg.state_measured": "hand_state",
             **{name: name for name in images | poses},
         }.items():
-            builder.Connect(
-                self.station.GetOutputPort(source), self._machine.GetInputPort(target)
-            )
+            builder.Connect(self.station.GetOutputPort(source), self._machine.GetInputPort(target))
         for source, target in {"position": "iiwa.position", "width": "wsg.position"}.items():
-            builder.Connect(
-                self._machine.GetOutputPort(source), self.station.GetInputPort(target)
-            )
+            builder.Connect(self._machine.GetOutputPort(source), self.station.GetInputPort(target))
         self.diagram = builder.Build()
         self.cameras = cameras
         self.simulator = Simulator(self.diagram)
@@ -122,9 +115,19 @@ class ClearBinRun:
     def advance(self) -> bool:
         """Simulates a tenth of a second; returns whether the task goes on."""
         started = time.perf_counter()
-        self.simulator.AdvanceTo(self.simulator.get_context().get_time() + _STEP)
+        self.simulator.AdvanceTo(self.time + _STEP)
         self._wall += time.perf_counter() - started
         return not self.memory.finished
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the first look."""
+        return self.simulator.get_context().get_time()
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated seconds per wall second up to now."""
+        return self.time / self._wall if self._wall else 0.0
 
     @property
     def memory(self) -> Memory:
@@ -146,16 +149,15 @@ class ClearBinRun:
         """What has come of it up to now."""
         memory = self.memory
         attempts = memory.attempts
-        now = self.simulator.get_context().get_time()
         if memory.pick is not None:
-            attempts = (*attempts, dc.replace(memory.pick.attempt, end=now))
+            attempts = (*attempts, dc.replace(memory.pick.attempt, end=self.time))
         return ClearBinReport(
             seed=self._seed,
             finished=memory.finished or ("interrupted" if interrupted else "time is up"),
             interrupted=interrupted,
             attempts=attempts,
             objects=self._results(),
-            sim_time=now,
+            sim_time=self.time,
             wall_time=self._wall,
         )
 
