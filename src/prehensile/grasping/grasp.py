@@ -45,8 +45,10 @@ class GraspConfig:
     weight_offset: float = 0.5
     # opening (as a share of the largest),
     weight_opening: float = 0.1
-    # share of points between the pads that belong to another object.
+    # share of points between the pads that belong to another object,
     weight_mixed: float = 0.5
+    # other things seen to rest on the object (1 for plenty).
+    weight_burden: float = 0.3
     # Grasps closer than this [m] and min_angle to a better one are left out; 0 or more.
     min_distance: float = 0.015
     # Grasps closer than this [rad] and min_distance to a better one are left out; 0 to pi.

@@ -18,12 +18,15 @@ from prehensile.grasping.collision import boxes_overlap
 from prehensile.grasping.grasp import GraspConfig, GraspStatus
 from prehensile.grasping.gripper import ParallelGripper
 from prehensile.perception.cloud import Box, Cloud
+from prehensile.perception.segmentation import resting_pairs
 
 # Width of the cells into which a column is divided along x [m].
 _CELL = 0.0025
 # An object narrower than this [m] must be seen from both sides: what looks like free space behind
 # its one side may be its own inside.
 _MIN_UNSEEN_SPAN = 0.03
+# So many pairs of adjacent points that show something resting on the object are plenty.
+_FULL_BURDEN = 15
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def evaluate(
     finger, within the largest opening; if the contacts are antipodal; and if neither hand nor
     wrist, swept along the approach, touch the cloud or an obstacle. Its score is
 
-        contact quality - tilt - offset - opening - mixed
+        contact quality - tilt - offset - opening - mixed - burden
 
     with the weights of the config. The contact quality is the mean of both sides' own: of the
     points that a pad touches first, the sum of the squared x components of the normals (those
@@ -111,12 +114,17 @@ def evaluate(
         width=np.zeros(M),
         span=np.zeros(M),
         score=np.full(M, -np.inf),
-        terms={name: np.zeros(M) for name in ("contact", "tilt", "offset", "opening", "mixed")},
+        terms={
+            name: np.zeros(M)
+            for name in ("contact", "tilt", "offset", "opening", "mixed", "burden")
+        },
         contact_axis=np.zeros((M, 3)),
     )
     centres = _segment_centres(cloud, segments)
+    resting = resting_pairs(cloud, segments, config.voxel_size).sum(axis=1)
+    burdens = np.minimum(resting / _FULL_BURDEN, 1.0)
     for rows in _places(candidates.seed):
-        _evaluate_columns(candidates, rows, cloud, segments, centres, gripper, config, out)
+        _evaluate_columns(candidates, rows, cloud, segments, centres, burdens, gripper, config, out)
     alive = np.nonzero(out.status == GraspStatus.FOUND)[0]
     if len(obstacles) > 0 and len(alive) > 0:
         hits = _hits_obstacles(candidates.R_WP, out, alive, gripper, obstacles, config)
@@ -153,6 +161,7 @@ def _evaluate_columns(
     cloud: Cloud,
     segments: NDArray[np.int64],
     centres: NDArray[np.float64],
+    burdens: NDArray[np.float64],
     gripper: ParallelGripper,
     config: GraspConfig,
     out: Evaluation,
@@ -228,15 +237,17 @@ def _evaluate_columns(
 
     label = candidates.segment[rows]
     other = np.bincount(k, segments[n_pad] != label[k], m)
-    arm = np.zeros(m)
+    arm, burden = np.zeros(m), np.zeros(m)
     known = label >= 0
     arm[known] = np.linalg.norm((out.p_WP[rows] - centres[label])[known, :2], axis=1)
+    burden[known] = burdens[label[known]]
     terms = {
         "contact": quality,
         "tilt": -config.weight_tilt * (1.0 + R[:, 2, 1]),
         "offset": -config.weight_offset * arm / 0.1,
         "opening": -config.weight_opening * out.width[rows] / gripper.max_width,
         "mixed": -config.weight_mixed * other / np.maximum(np.bincount(k, minlength=m), 1),
+        "burden": -config.weight_burden * burden,
     }
     for name, term in terms.items():
         out.terms[name][rows] = term

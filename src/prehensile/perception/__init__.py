@@ -3,7 +3,7 @@
 from prehensile.perception.cloud import Box, Cloud, crop, inside_box
 from prehensile.perception.depth import normals_from_depth, unproject
 from prehensile.perception.fusion import downsample, fuse_depth_images
-from prehensile.perception.segmentation import convex_segments
+from prehensile.perception.segmentation import convex_segments, resting_pairs
 
 __all__ = [
     "Box",
@@ -14,5 +14,6 @@ __all__ = [
     "fuse_depth_images",
     "inside_box",
     "normals_from_depth",
+    "resting_pairs",
     "unproject",
 ]

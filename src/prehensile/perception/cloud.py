@@ -88,9 +88,10 @@ def inside_box(points: NDArray[np.floating], box: Box) -> NDArray[np.bool_]:
     R_BW, p_BW = X_BW.rotation().matrix(), X_BW.translation()
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     inside = np.ones(points.shape[:-1], dtype=bool)
-    for k in range(3):
-        p_k = R_BW[k, 0] * x + R_BW[k, 1] * y + R_BW[k, 2] * z + p_BW[k]
-        inside &= np.abs(p_k) <= 0.5 * box.size[k]
+    with np.errstate(invalid="ignore"):
+        for k in range(3):
+            p_k = R_BW[k, 0] * x + R_BW[k, 1] * y + R_BW[k, 2] * z + p_BW[k]
+            inside &= np.abs(p_k) <= 0.5 * box.size[k]
     return inside
 
 

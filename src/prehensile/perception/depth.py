@@ -52,9 +52,10 @@ def normals_from_depth(
     Under a pinhole the inverse depth of a plane is an affine function of the pixel, so the plane
     of a window of pixels is a least-squares fit of three numbers, made by sums along rows and
     columns. Each pixel then takes the plane of one of nine windows that contain it (centred on
-    it, or with it on the rim): its own if that fits, or else the best-fitting one. Thus no normal
-    mixes the two sides of an edge of depth or of a crease; a pixel that no window fits (a speck,
-    a sliver, a flying pixel) gets none. Choosing the smoothest of the windows around a pixel is
+    it, or with it on the rim): its own, unless another fits several times better, as happens
+    near an edge of depth or a crease, but not on a surface that is merely curved. Thus no normal
+    mixes the two sides of an edge; a pixel that no window fits (a speck, a sliver, a flying
+    pixel) gets none. Choosing the smoothest of the windows around a pixel is
     Kuwahara's filter (1976); planes in inverse depth are those of Fan et al., "Three-Filters-to-
     Normal" (2021).
 
@@ -118,15 +119,15 @@ def normals_from_depth(
         )
         return fits, np.stack([m_x, m_y, m_z], axis=-1) / -length[:, None]
 
-    # A pixel whose own window fits to a tenth of the bound keeps it; the others take the best of
-    # nine. Windows are named by their flat indices in `residual`.
+    # Windows are named by their flat indices in `residual`. A pixel whose own window fits to a
+    # twentieth of the bound keeps it without a look at the others.
     own = np.full((H, W), np.inf)
     own[r : H - r, r : W - r] = residual
     v, u = np.nonzero(np.isfinite(z))
     at = np.clip(v - r, 0, H - 1 - 2 * r) * (W - 2 * r) + np.clip(u - r, 0, W - 1 - 2 * r)
-    unsettled = np.nonzero(own[v, u] > 0.1 * max_residual)[0]
+    unsettled = np.nonzero(own[v, u] > 0.05 * max_residual)[0]
     v0, u0 = v[unsettled], u[unsettled]
-    best, best_at = own[v0, u0], at[unsettled]
+    best, best_at = 0.4 * own[v0, u0], at[unsettled]
     for dv in (-r, 0, r):
         for du in (-r, 0, r):
             v1, u1 = v0 + dv - r, u0 + du - r

@@ -70,6 +70,39 @@ def convex_segments(
     return labels
 
 
+def resting_pairs(cloud: Cloud, labels: NDArray[np.int64], voxel_size: float) -> NDArray[np.int64]:
+    """How much of each segment is seen to lie under each other one.
+
+    Where something stands or leans on a surface, a patch that faces upward meets one that does
+    not, in a concave edge.
+
+    Args:
+        cloud: one point per voxel.
+        labels: (N,) segments 0..L-1 of its points, -1 for none.
+        voxel_size: edge of the voxels [m].
+
+    Returns:
+        (L, L) matrix; entry [a, b] counts the adjacent points that show b resting on a.
+    """
+    count = labels.max(initial=-1) + 1
+    result = np.zeros((count, count), dtype=np.int64)
+    if count == 0:
+        return result
+    i, j = _adjacent_pairs(cloud.points, voxel_size)
+    i, j = np.concatenate([i, j]), np.concatenate([j, i])
+    up = cloud.normals[:, 2]
+    on = (
+        (labels[i] != labels[j])
+        & (labels[i] >= 0)
+        & (labels[j] >= 0)
+        & (up[i] > 0.5)
+        & (up[j] < 0.5)
+        & (cloud.points[j, 2] >= cloud.points[i, 2])
+    )
+    np.add.at(result, (labels[i[on]], labels[j[on]]), 1)
+    return result
+
+
 def _adjacent_pairs(
     points: NDArray[np.float64], voxel_size: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
