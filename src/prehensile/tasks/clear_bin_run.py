@@ -111,12 +111,14 @@ class ClearBinRun:
         self.cameras = cameras
         self.simulator = Simulator(self.diagram)
         self._wall = 0.0
+        self._cpu = 0.0
 
     def advance(self) -> bool:
         """Simulates a tenth of a second; returns whether the task goes on."""
-        started = time.perf_counter()
+        started, cpu_started = time.perf_counter(), time.process_time()
         self.simulator.AdvanceTo(self.time + _STEP)
         self._wall += time.perf_counter() - started
+        self._cpu += time.process_time() - cpu_started
         return not self.memory.finished
 
     @property
@@ -159,6 +161,7 @@ class ClearBinRun:
             objects=self._results(),
             sim_time=self.time,
             wall_time=self._wall,
+            cpu_time=self._cpu,
         )
 
     def _results(self) -> list[ObjectResult]:

@@ -66,6 +66,7 @@ class ClearBinReport:
         objects: where each object ended (known to the simulator alone).
         sim_time: simulated seconds, from the first look on.
         wall_time: wall seconds that these took.
+        cpu_time: seconds of processor time that these took, on all cores.
     """
 
     seed: int
@@ -75,6 +76,7 @@ class ClearBinReport:
     objects: Sequence[ObjectResult]
     sim_time: float
     wall_time: float
+    cpu_time: float
 
     @property
     def grasp_attempts(self) -> int:
@@ -118,6 +120,7 @@ class ClearBinReport:
                     "seconds_per_pick": self.seconds_per_pick,
                     "sim_time": self.sim_time,
                     "wall_time": self.wall_time,
+                    "cpu_time": self.cpu_time,
                     "realtime_factor": self.realtime_factor,
                 },
                 "attempts": [vars(a) for a in self.attempts],
