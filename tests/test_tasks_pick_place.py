@@ -1,0 +1,109 @@
+"""Pick and place in simulation: the brick ends where it is wanted."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RotationMatrix
+
+from prehensile.planning.arm import ArmModel
+from prehensile.station.robot_plant import make_robot_diagram
+from prehensile.station.scenario_file import load_scenario
+from prehensile.tasks.pick_place import (
+    X_BrickG,
+    choose_poses,
+    plan_pick_place,
+    run_demo,
+    run_pick_place,
+)
+
+
+def brick(x: float, y: float, yaw_degrees: float) -> RigidTransform:
+    """A brick that lies on the table."""
+    return RigidTransform(RotationMatrix.MakeZRotation(math.radians(yaw_degrees)), [x, y, 0.025])
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return ArmModel(make_robot_diagram(load_scenario("pick_brick")))
+
+
+def test_grasp_frame_comes_from_above_and_closes_on_the_short_side():
+    R_BrickG = X_BrickG.rotation()
+    np.testing.assert_allclose(R_BrickG.col(1), [0.0, 0.0, -1.0], atol=1e-12)
+    assert abs(R_BrickG.col(0)[0]) == pytest.approx(1.0)
+
+
+def test_poses_are_on_the_table_apart_and_repeatable():
+    for seed in range(20):
+        start, goal = choose_poses(seed)
+        again, _ = choose_poses(seed)
+        assert start.IsExactlyEqualTo(again)
+        assert np.linalg.norm(start.translation() - goal.translation()) >= 0.2
+        for X_WBrick in (start, goal):
+            assert X_WBrick.translation()[2] == pytest.approx(0.025)
+            np.testing.assert_allclose(X_WBrick.rotation().col(2), [0.0, 0.0, 1.0], atol=1e-12)
+
+
+def test_every_start_and_goal_has_a_plan_of_few_seconds(arm):
+    for seed in range(20):
+        sequence, reason = plan_pick_place(arm, *choose_poses(seed), seed=seed)
+        assert sequence is not None, reason
+        assert sequence.duration < 9.0
+        q_first, width, _ = sequence.command(0.0)
+        np.testing.assert_array_equal(q_first, arm.q_default)
+        q_last, _, done = sequence.command(sequence.duration)
+        assert done
+        np.testing.assert_allclose(q_last, arm.q_default, atol=1e-9)
+        assert width == pytest.approx(0.1)
+
+
+def test_same_seed_same_plan(arm):
+    poses = brick(0.5, -0.2, 30.0), brick(0.45, 0.25, -70.0)
+    a, b = (plan_pick_place(arm, *poses, seed=4)[0] for _ in range(2))
+    assert a is not None
+    assert b is not None
+    for t in np.linspace(0.0, a.duration, 50):
+        np.testing.assert_array_equal(a.command(t)[0], b.command(t)[0])
+
+
+def test_a_goal_out_of_reach_is_said_and_nothing_moves():
+    report = run_pick_place(brick(0.5, -0.2, 30.0), brick(1.4, 0.0, 0.0))
+    assert not report.success
+    assert "placing" in report.reason
+    assert "out of reach" in report.reason
+    assert report.sim_time == 0.0
+    json.dumps(report.to_json(), allow_nan=False)
+
+
+def test_the_brick_ends_at_its_goal():
+    report = run_pick_place(brick(0.5, -0.2, 30.0), brick(0.45, 0.25, -70.0))
+    assert not report.reason
+    # Independent of the report's own arithmetic.
+    offset = report.X_WEnd.translation() - report.X_WGoal.translation()
+    assert np.linalg.norm(offset) < 0.01
+    R = report.X_WEnd.rotation().matrix().T @ report.X_WGoal.rotation().matrix()
+    assert math.degrees(math.acos(min(1.0, (np.trace(R) - 1.0) / 2.0))) < 3.0
+    assert report.success
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("yaw", range(-180, 180, 45))
+def test_the_brick_ends_at_its_goal_at_every_yaw(yaw):
+    angle = math.radians(yaw)
+    start = brick(0.5 + 0.06 * math.cos(angle), -0.2 + 0.06 * math.sin(angle), yaw)
+    report = run_pick_place(start, brick(0.5, 0.22, 3 * yaw + 10.0), seed=yaw % 7)
+    assert report.success, report.reason
+    assert report.position_error < 0.005
+    assert report.angle_error < math.radians(1.5)
+
+
+@pytest.mark.slow
+def test_demo_leaves_a_report_and_a_replay(tmp_path):
+    report = run_demo(seed=1, browser=False, out=tmp_path / "out")
+    assert report.success
+    written = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert written["success"] is True
+    assert written["position_error_mm"] == pytest.approx(1e3 * report.position_error)
+    assert (tmp_path / "out" / "replay.html").stat().st_size > 100_000
