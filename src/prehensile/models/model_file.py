@@ -100,7 +100,7 @@ class ModelFileReader:
         if real in self._known:
             return self._known[real]
         model = ModelFile(path)
-        if path.suffix not in (".sdf", ".urdf"):
+        if path.suffix not in (".sdf", ".urdf", ".xml"):
             model.opaque = True
         else:
             before = len(self._findings)
@@ -131,6 +131,9 @@ class _FileChecker:
         self._said: set[str] = set()
 
     def check(self, root: Element) -> None:
+        if self._model.path.suffix == ".xml":
+            self._check_mjcf(root)
+            return
         sdf = self._model.path.suffix == ".sdf"
         wanted = "sdf" if sdf else "robot"
         if root.tag != wanted:
@@ -142,9 +145,11 @@ class _FileChecker:
             models = root.all("model")
             if len(models) != 1 or root.child("world"):
                 self._model.opaque = True  # a world: several models, named by the file
-            for element in [*models, *(m for w in root.all("world") for m in w.children)]:
+            for element in (c for top in (root, *root.all("world")) for c in top.children):
                 if element.tag == "model":
                     self._check_sdf_model(element, "")
+                elif element.tag == "include":
+                    self._check_include(element, "")
         else:
             self._check_urdf(root)
 
@@ -161,7 +166,8 @@ class _FileChecker:
         for joint in model.all("joint"):
             kind = joint.attributes.get("type", "")
             self._model.joints[scope + joint.name] = _SDF_DOF.get(kind)
-            frames.add(scope + joint.name)
+            # Drake makes frames of a joint's name.
+            frames |= {f"{scope}{joint.name}{end}" for end in ("", "_parent", "_child")}
             for axis in (c for c in joint.children if c.tag in ("axis", "axis2")):
                 limit = axis.child("limit")
                 if limit is not None:
@@ -185,12 +191,8 @@ class _FileChecker:
         if path is None or root is None:
             self._model.opaque = True
             return
-        if path.resolve() in self._stack:
-            self._add(uri, "the file includes itself", "break the circle of <include> elements")
+        if not self._may_include(uri, path):
             self._model.opaque = True
-            return
-        if len(self._stack) >= _MAX_INCLUDES:
-            self._add(uri, f"files include each other more than {_MAX_INCLUDES} deep")
             return
         inner = self._reader._read(path, root, self._stack)
         name = include.child("name")
@@ -202,6 +204,31 @@ class _FileChecker:
         self._model.joints |= {prefix + joint: n for joint, n in inner.joints.items()}
         self._model.shapes += inner.shapes
         self._model.opaque |= inner.opaque
+
+    def _may_include(self, element: Element, path: Path) -> bool:
+        """Reports a file that includes itself: Drake would follow it until it crashes."""
+        if path.resolve() in self._stack:
+            self._add(element, "the file includes itself", "break the circle of <include> elements")
+        elif len(self._stack) >= _MAX_INCLUDES:
+            self._add(element, f"files include each other more than {_MAX_INCLUDES} deep")
+        else:
+            return True
+        return False
+
+    # MJCF
+
+    def _check_mjcf(self, root: Element) -> None:
+        """Numbers and included files; the names in it are left to Drake."""
+        self._model.opaque = True
+        if root.tag not in ("mujoco", "mujocoinclude"):
+            self._add(root, f"the outermost element is <{root.tag}>, not <mujoco>")
+            return
+        for element in root.walk():
+            self._check_numbers(element)
+            if element.tag == "include":
+                path, folder = self._resolve(element, element.attributes.get("file", ""))
+                if path and folder and self._may_include(element, path):
+                    self._reader._read(path, folder, self._stack)
 
     # URDF
 
@@ -216,6 +243,7 @@ class _FileChecker:
                 continue
             kind = joint.attributes.get("type", "")
             self._model.joints[joint.name] = _SDF_DOF.get(kind)
+            self._model.frames |= {joint.name + end for end in ("_parent", "_child")}
             limit = joint.child("limit")
             if limit is not None:
                 self._check_limits(limit, joint.name, limit.attributes)
@@ -253,6 +281,8 @@ class _FileChecker:
             self._add(mass, f"the mass of link '{link}' is {value:g} kg", "a mass is at least 0")
 
     def _check_collision(self, collision: Element, geometry: Element, link: str) -> None:
+        for shape in geometry.children:
+            self._check_size(shape, link)
         size = _greatest_extent(geometry)
         hint: float | None = None
         for element in collision.walk():
@@ -269,6 +299,17 @@ class _FileChecker:
         if size is not None:
             where = f"link '{link}'"
             self._model.shapes.append(Shape(collision.line, where, size, hint))
+
+    def _check_size(self, shape: Element, link: str) -> None:
+        values = shape.attributes | {c.tag: c.text for c in shape.children}
+        for key in ("size", "radius", "length", "radii", "drake:radius", "drake:length"):
+            for value in (_number(token) for token in values.get(key, "").split()):
+                if value is not None and (value <= 0 or math.isinf(value)):
+                    self._add(
+                        shape,
+                        f"the {key} of a {shape.tag} on link '{link}' is {value:g}",
+                        "sizes are finite and > 0",
+                    )
 
     def _check_resolution(
         self, element: Element, hint: float, size: float | None, link: str

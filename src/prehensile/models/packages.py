@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from prehensile.errors import Finding, InputError
+from prehensile.yaml_lines import close_to
 
 if TYPE_CHECKING:
     from pydrake.multibody.parsing import PackageMap
@@ -23,6 +24,9 @@ DATA = Path(__file__).resolve().parent / "data"
 MODEL_PATH_VARIABLE = "PREHENSILE_MODEL_PATH"
 """Environment variable that lists folders of models, separated as in PATH."""
 
+MODEL_SUFFIXES = (".sdf", ".urdf")
+
+_MAX_DEPTH = 4  # folders below a package's root in which models are looked for
 _MAX_XML_BYTES = 1 << 20
 _URL = re.compile(r"package://([^/]+)/(.+)", re.DOTALL)
 
@@ -114,7 +118,7 @@ def package_map(packages: Mapping[str, str | Path] | None = None) -> "PackageMap
     if result.Contains("drake_models"):
         result.Remove("drake_models")
     for name, root in find_packages(packages).items():
-        result.Add(name, str(root))
+        result.Add(name, root)
     return result
 
 
@@ -162,7 +166,24 @@ def resolve(url: str, packages: Mapping[str, Path]) -> Path:
                 f"{MODEL_PATH_VARIABLE}",
             )
         )
-    return inside(root, root / path, url)
+    try:
+        return inside(root, root / path, url)
+    except InputError:
+        files = [f"package://{name}/{f.relative_to(root).as_posix()}" for f in model_files(root)]
+        if url.endswith(MODEL_SUFFIXES) and url not in files and ".." not in path:
+            mend = close_to(url, files, f"looked for it at {root / path}")
+            raise InputError(Finding(f"there is no file '{url}'", mend)) from None
+        raise
+
+
+def model_files(root: Path) -> list[Path]:
+    """Lists the SDF and URDF files of a package, a few folders deep.
+
+    Args:
+        root: the package's root folder.
+    """
+    patterns = ("*/" * depth + "*" for depth in range(_MAX_DEPTH))
+    return sorted(p for k in patterns for p in root.glob(k) if p.suffix in MODEL_SUFFIXES)
 
 
 def inside(root: Path, path: Path, said: str) -> Path:

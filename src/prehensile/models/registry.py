@@ -21,6 +21,7 @@ from prehensile.models.packages import (
     DATA,
     MODEL_PATH_VARIABLE,
     find_packages,
+    model_files,
     package_map,
     resolve,
 )
@@ -41,7 +42,6 @@ CATEGORIES = ("arm", "hand", "camera", "furniture", "object", "other")
 """The categories of models, in the order in which they are listed."""
 
 _LIST_MEND = "'prehensile models list' names them all"
-_MAX_DEPTH = 4  # folders below a package's root in which models are looked for
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def list_models(packages: Mapping[str, str | Path] | None = None) -> list[ModelI
         if path.stem == path.parent.name
     ]
     for name in dict.fromkeys(named):
-        infos += [_read_info(name, found[name], path) for path in _model_files(found[name])]
+        infos += [_read_info(name, found[name], path) for path in model_files(found[name])]
     return sorted(infos, key=lambda info: (CATEGORIES.index(info.category), info.name))
 
 
@@ -161,7 +161,7 @@ def load_spheres(
         if (
             not isinstance(link, str)
             or array.ndim != 2
-            or array.shape[1] != 4
+            or array.shape[-1] != 4
             or not np.isfinite(array).all()
             or not (array[:, 3] > 0).all()
         ):
@@ -186,14 +186,6 @@ def _named_in_environment(found: Mapping[str, Path]) -> list[str]:
         for folder in filter(None, os.environ.get(MODEL_PATH_VARIABLE, "").split(os.pathsep))
     }
     return [name for name, root in found.items() if root in folders]
-
-
-def _model_files(root: Path) -> list[Path]:
-    """The SDF and URDF files of a package, not too deep."""
-    patterns = ("*/" * depth + "*" for depth in range(_MAX_DEPTH))
-    return sorted(
-        path for p in patterns for path in root.glob(p) if path.suffix in (".sdf", ".urdf")
-    )
 
 
 def _read_yaml(path: Path) -> dict:

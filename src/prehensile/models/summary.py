@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from prehensile.models.packages import find_packages, package_map
 from prehensile.models.registry import ModelInfo, load_spheres
 
 if TYPE_CHECKING:
+    from pydrake.geometry import GeometryId, SceneGraphInspector
+    from pydrake.math import RigidTransform
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import ModelInstanceIndex
+    from pydrake.planning import RobotDiagram
 
 
 @dataclass(frozen=True)
@@ -92,14 +95,14 @@ def summarize(info: ModelInfo, packages: Mapping[str, str | Path] | None = None)
         parser.package_map().Remove(name)
     parser.package_map().AddMap(package_map(packages))
     try:
-        instances = parser.AddModels(str(info.path))
-    except RuntimeError as error:
+        instances = parser.AddModels(info.path)
+    except (RuntimeError, SystemExit) as error:  # a failed DRAKE_DEMAND is a SystemExit
         raise InputError(Finding(" ".join(str(error).split()), file=str(info.path))) from error
     plant = builder.plant()
     bodies = [
         plant.get_body(index) for instance in instances for index in plant.GetBodyIndices(instance)
     ]
-    diagram = builder.Build()
+    diagram = cast("RobotDiagram", builder.Build())
     context = diagram.CreateDefaultContext()
     plant_context = diagram.plant().GetMyContextFromRoot(context)
     inspector = diagram.scene_graph().model_inspector()
@@ -117,12 +120,8 @@ def summarize(info: ModelInfo, packages: Mapping[str, str | Path] | None = None)
         X_OB = body.EvalPoseInWorld(plant_context)
         X_OB = bodies[0].EvalPoseInWorld(plant_context).InvertAndCompose(X_OB)
         for geometry in {*ids, *seen}:
-            box = inspector.GetObbInGeometryFrame(geometry)
-            if box is None:
-                continue  # a half space
-            signs = np.array(list(itertools.product((-1, 1), repeat=3)))
-            X_OBox = X_OB @ inspector.GetPoseInFrame(geometry) @ box.pose()
-            corners.append((X_OBox @ (signs * box.half_width()).T).T)
+            X_OG = X_OB @ inspector.GetPoseInFrame(geometry)
+            corners.append(_extreme_points(inspector, geometry, X_OG))
     points = np.concatenate(corners)
     try:
         spheres = {link: len(rows) for link, rows in load_spheres(info).items()}
@@ -139,6 +138,28 @@ def summarize(info: ModelInfo, packages: Mapping[str, str | Path] | None = None)
     )
 
 
+def _extreme_points(
+    inspector: "SceneGraphInspector", geometry: "GeometryId", X_OG: "RigidTransform"
+) -> np.ndarray:
+    """Points (N, 3) in frame O whose bounding box is that of a geometry."""
+    from pydrake.geometry import Capsule, Sphere
+
+    shape = inspector.GetShape(geometry)
+    hull = inspector.GetConvexHull(geometry)
+    if hull is not None:
+        vertices = [hull.vertex(i) for i in range(hull.num_vertices())]
+        return (X_OG @ np.array(vertices).T).T
+    if isinstance(shape, Sphere | Capsule):
+        half = shape.length() / 2 if isinstance(shape, Capsule) else 0.0
+        ends = (X_OG @ np.array([[0, 0, half], [0, 0, -half]]).T).T
+        return np.concatenate([ends - shape.radius(), ends + shape.radius()])
+    box = inspector.GetObbInGeometryFrame(geometry)
+    if box is None:
+        return np.zeros((0, 3))  # a half space
+    signs = np.array(list(itertools.product((-1, 1), repeat=3)))
+    return (X_OG @ box.pose() @ (signs * box.half_width()).T).T
+
+
 def _joints(
     plant: "MultibodyPlant", instances: "list[ModelInstanceIndex]"
 ) -> tuple[JointSummary, ...]:
@@ -149,9 +170,9 @@ def _joints(
         JointSummary(
             name=joint.name(),
             type=joint.type_name(),
-            lower=joint.position_lower_limits(),
-            upper=joint.position_upper_limits(),
-            velocity=joint.velocity_upper_limits(),
+            lower=np.array(joint.position_lower_limits(), float),
+            upper=np.array(joint.position_upper_limits(), float),
+            velocity=np.array(joint.velocity_upper_limits(), float),
             effort=efforts.get(joint.index()),
         )
         for joint in joints

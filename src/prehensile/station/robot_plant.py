@@ -29,7 +29,7 @@ def flat_directives(scenario: Scenario) -> list[ModelDirective]:
     try:
         directives = ModelDirectives(directives=scenario.directives)
         return FlattenModelDirectives(directives, packages).directives
-    except RuntimeError as error:
+    except (RuntimeError, SystemExit) as error:  # DRAKE_DEMAND raises SystemExit
         raise _directives_error(scenario, error) from error
 
 
@@ -63,7 +63,7 @@ def add_models(
             ),
             parser=parser,
         )
-    except RuntimeError as error:
+    except (RuntimeError, SystemExit) as error:  # DRAKE_DEMAND raises SystemExit
         raise _directives_error(scenario, error) from error
 
 
@@ -243,6 +243,6 @@ def _freeze(plant: MultibodyPlant, models: Collection[str]) -> None:
                 plant.AddJoint(WeldJoint(name, parent, child, RigidTransform()))
 
 
-def _directives_error(scenario: Scenario, error: RuntimeError) -> InputError:
+def _directives_error(scenario: Scenario, error: BaseException) -> InputError:
     message = " ".join(str(error).split())
     return InputError(Finding(message, file=str(scenario.file or ""), key="directives"))

@@ -97,6 +97,8 @@ class Directives:
                 continue
             kind, body = kinds[0], item.value[kinds[0]]
             if not isinstance(body.value, dict):
+                if body.value is None:  # which the types allow
+                    self._add(body, f"{kind} is empty", f"it needs {' and '.join(_REQUIRED[kind])}")
                 continue
             missing = [k for k in _REQUIRED[kind] if not body.value.get(k) or _empty(body.value[k])]
             for key in missing:

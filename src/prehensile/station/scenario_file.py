@@ -5,7 +5,8 @@ is found before anything is built, and all of them are reported at once, each wi
 and mend.
 
 A file holds one scenario at its top level, or a map from names to scenarios; keys that begin with
-``_`` are ignored, so that anchors have a place. ``scenario_name`` picks one of the named ones.
+``_`` are ignored, so that anchors have a place. Random poses in the scenario's own directives
+(``rotation: !Uniform {}``) are drawn by ``random_seed``. ``scenario_name`` picks one of the named.
 ``data``, a YAML text with the same keys as a scenario, is laid on top: maps are merged key by key,
 lists (``directives`` above all) and scalars are replaced. Both as in Drake's hardware simulation.
 """
@@ -24,6 +25,7 @@ from pydrake.common.yaml import yaml_dump, yaml_load_typed
 from prehensile.errors import Finding, InputError
 from prehensile.models.packages import find_packages
 from prehensile.station.drivers import driver_types
+from prehensile.station.random_poses import draw_poses
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_check import check_scenario
 from prehensile.station.schema import check
@@ -155,6 +157,7 @@ def _build(
     """Validates the merged YAML and makes the scenario's structs of it."""
     if root is None:
         raise InputError(*findings)
+    file = root.file
     schema = _schema()
     if not isinstance(root.value, dict):
         raise InputError(*findings, root.finding("a scenario is a map of keys"))
@@ -164,7 +167,7 @@ def _build(
             findings.append(node.finding(f"unknown key '{key}'", close_to(key, schema)))
             continue
         before = len(findings)
-        check(node, schema[key], findings)
+        check(node, schema[key], findings, ("Scenario", key))
         if key == "packages" and len(findings) == before:
             base = path.parent if path else Path()
             folders |= {k: (base / Path(n.value).expanduser()) for k, n in node.value.items()}
@@ -185,7 +188,9 @@ def _build(
                 said = " ".join(str(error).split())
                 findings.append(node.finding(f"Drake refuses this section: {said}"))
     if findings:
-        raise InputError(*findings)
+        # The scenario's own first, in the order of its lines.
+        raise InputError(*sorted(findings, key=lambda f: (f.file != file, f.file, f.line)))
+    draw_poses(values.get("directives", []), values.get("random_seed", 0))
     values["packages"] = {name: str(Path(p).absolute()) for name, p in folders.items()}
     return Scenario(**values, file=path.absolute() if path else None)
 

@@ -159,7 +159,9 @@ CHOICES: dict[tuple[str, str], tuple[str, ...]] = {
 _MAX_ITEMS = 10_000
 
 
-def check(node: Node, schema: Any, findings: list[Finding]) -> None:
+def check(
+    node: Node, schema: Any, findings: list[Finding], where: tuple[str, str] = ("", "")
+) -> None:
     """Checks a YAML node, and everything below it, against a type.
 
     Args:
@@ -168,8 +170,9 @@ def check(node: Node, schema: Any, findings: list[Finding]) -> None:
             ``bool``, ``numpy.ndarray``, or a list, dict, Optional or Union of such.
         findings: what is wrong is appended here: unknown keys, wrong types, NaN, values out of
             range.
+        where: struct and field that the node is the value of, for its range.
     """
-    _check(node, schema, ("", ""), findings)
+    _check(node, schema, where, findings)
 
 
 def struct_fields(schema: Any) -> dict[str, Any] | None:
