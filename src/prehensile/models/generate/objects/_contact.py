@@ -18,6 +18,7 @@ from prehensile.models.generate.sdf_model import Collision, Contact, Shape
 BALL = 0.001  # m, radius of the balls at corners and rims
 INSET = 0.0003  # m, from the surface of the balls to that of the hulls
 FRICTION = 0.6
+STIFFNESS = 3e4  # N/m: 0.1 mm under 3 N; stiffer piles cost the solver more and shiver
 
 
 def hull(
@@ -43,7 +44,13 @@ def hull(
     given = np.asarray(pose, dtype=float)
     full[: len(given)] = given
     x, y, z, roll, pitch, yaw = full
-    contact = Contact(mu=mu, hydroelastic="rigid", resolution=resolution, relaxation_time=0.02)
+    contact = Contact(
+        mu=mu,
+        hydroelastic="rigid",
+        resolution=resolution,
+        relaxation_time=0.02,
+        stiffness=STIFFNESS,
+    )
     shape = Shape(kind, tuple(float(v) for v in np.asarray(size)))
     return Collision(name, shape, (x, y, z, roll, pitch, yaw), contact)
 
