@@ -23,9 +23,11 @@ class GraspConfig:
     # Step of the approach angles about the closing axis [rad]; above 0.
     tilt_step: float = float(np.deg2rad(20))
     # How far past the seed the pads' centre is put along the approach [m]; any number of values.
-    depths: tuple[float, ...] = (-0.006, 0.004, 0.014, 0.026)
-    # Free space left on each side of a finger while it goes down, in x [m]; 0 or more.
+    depths: tuple[float, ...] = (-0.012, -0.002, 0.01, 0.024)
+    # Free space wished for between finger and object while it goes down [m]; 0 or more.
     clearance: float = 0.005
+    # The least of it, and that to neighbours behind the finger [m]; 0 to clearance.
+    min_clearance: float = 0.002
     # Distance that the rest of the hand keeps from points of the cloud [m]; 0 or more.
     margin: float = 0.003
     # Distance that the hand keeps from obstacles such as walls and floor [m]; 0 or more.
@@ -47,6 +49,8 @@ class GraspConfig:
     weight_opening: float = 0.1
     # share of points between the pads that belong to another object,
     weight_mixed: float = 0.5
+    # less room beside the object than wished for,
+    weight_tight: float = 0.1
     # other things seen to rest on the object (1 for plenty).
     weight_burden: float = 0.3
     # Grasps closer than this [m] and min_angle to a better one are left out; 0 or more.
@@ -75,6 +79,8 @@ class GraspConfig:
             low_ok = value > 0 if f.name in positive else value >= 0
             if not (low_ok and value <= high and np.isfinite(value)):
                 faults.append(Finding(f"{value} is out of range", key=f.name))
+        if self.min_clearance > self.clearance:
+            faults.append(Finding("it is larger than clearance", key="min_clearance"))
         if faults:
             raise InputError(*faults)
 

@@ -25,8 +25,14 @@ _CELL = 0.0025
 # An object narrower than this [m] must be seen from both sides: what looks like free space behind
 # its one side may be its own inside.
 _MIN_UNSEEN_SPAN = 0.03
+# A normal with this component toward the palm belongs to a surface that no pad can press on.
+_FACES_PALM = 0.85
 # So many pairs of adjacent points that show something resting on the object are plenty.
 _FULL_BURDEN = 15
+
+
+TERMS = ("contact", "tilt", "offset", "opening", "mixed", "tight", "burden")
+"""Names of the terms that add up to a score."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ def evaluate(
     finger, within the largest opening; if the contacts are antipodal; and if neither hand nor
     wrist, swept along the approach, touch the cloud or an obstacle. Its score is
 
-        contact quality - tilt - offset - opening - mixed - burden
+        contact quality - tilt - offset - opening - mixed - tight - burden
 
     with the weights of the config. The contact quality is the mean of both sides' own: of the
     points that a pad touches first, the sum of the squared x components of the normals (those
@@ -114,10 +120,7 @@ def evaluate(
         width=np.zeros(M),
         span=np.zeros(M),
         score=np.full(M, -np.inf),
-        terms={
-            name: np.zeros(M)
-            for name in ("contact", "tilt", "offset", "opening", "mixed", "burden")
-        },
+        terms={name: np.zeros(M) for name in TERMS},
         contact_axis=np.zeros((M, 3)),
     )
     centres = _segment_centres(cloud, segments)
@@ -171,7 +174,7 @@ def _evaluate_columns(
     m = len(rows)
     tip = gripper.pad_y[1] - gripper.p_GPad[1]
     base = gripper.finger[0].y[0] - gripper.p_GPad[1]
-    room = gripper.finger_thickness + 2 * config.clearance
+    room = gripper.finger_thickness + 2 * config.min_clearance
     reach = gripper.max_gap + room
     half_z = 0.5 * gripper.finger[0].width + config.margin
     near, x, y, z = _local(cloud.points, R, p, np.hypot(reach, max(-base, tip)))
@@ -186,32 +189,47 @@ def _evaluate_columns(
     high = _largest(i[between], x[between], m)
     wide = ~np.isfinite(x_left) | ~np.isfinite(x_right) | ~np.isfinite(low)
 
-    # The pads close evenly, so the hand is centred on what they will touch; a side that no camera
-    # saw is taken to be where the column ends.
+    # What a pad can touch: neither surfaces that face the palm, nor, on its side of the object,
+    # ones that face away from it, such as the inside of a mug's wall.
     pad_half = 0.5 * (gripper.pad_y[1] - gripper.pad_y[0])
     at_pads = between & (np.abs(y) <= pad_half) & (np.abs(z) <= 0.5 * gripper.pad_width)
     k, n_pad, x_pad = i[at_pads], n[at_pads], x[at_pads]
     normals = cloud.normals[n_pad]
     normal_x = np.sum(R[k, :, 0] * normals, axis=1)
-    touch, seen = {}, {}
+    beside = np.sum(R[k, :, 1] * normals, axis=1) > -_FACES_PALM
+    with np.errstate(invalid="ignore"):
+        middle = 0.5 * (low + high)
+    # The pads close evenly, so the hand is centred on what they will touch; a side that no camera
+    # saw is taken to be where the column ends.
+    touch, seen, side = {}, {}, {}
     for sign, end in ((-1, -low), (1, high)):
-        faces = sign * normal_x > 0
-        seen[sign] = np.bincount(k[faces], minlength=m) > 0
-        touch[sign] = np.where(seen[sign], _largest(k, sign * x_pad, m), end)
+        side[sign] = beside & (sign * normal_x > -0.5) & (sign * (x_pad - middle[k]) > 0)
+        reached = _largest(k[side[sign]], sign * x_pad[side[sign]], m)
+        seen[sign] = np.isfinite(reached)
+        touch[sign] = np.where(seen[sign], reached, end)
     with np.errstate(invalid="ignore"):
         centre = 0.5 * (touch[1] - touch[-1])
         span = touch[1] + touch[-1]
         extent = np.maximum(high - centre, centre - low)
-    half_gap = np.minimum(extent + config.clearance, 0.5 * gripper.max_gap)
-    wide |= ~(half_gap - extent >= 0.5 * config.clearance)
-    outward = np.abs(x - centre[i]) - half_gap[i]
-    blocked = (outward >= 0) & (outward <= gripper.finger_thickness + config.margin)
-    hits = np.bincount(i[blocked], minlength=m) > 0
+
+    # Open as far as wished, or else as far as must be.
+    outward = np.abs(x - centre[i])
+
+    def blocked(half_gap: NDArray[np.float64]) -> NDArray[np.bool_]:
+        into = outward - half_gap[i]
+        inside = (into >= 0) & (into <= gripper.finger_thickness + config.min_clearance)
+        return (np.bincount(i[inside], minlength=m) > 0) | ~(half_gap <= 0.5 * gripper.max_gap)
+
+    half_gap = extent + config.clearance
+    tight = blocked(half_gap)
+    half_gap = np.where(tight, extent + config.min_clearance, half_gap)
+    wide |= ~(half_gap <= 0.5 * gripper.max_gap)
+    hits = blocked(half_gap)
 
     full = 0.5 * gripper.pad_width * 2 * pad_half / config.voxel_size**2
     quality, square, contact_axis = np.zeros(m), np.ones(m, dtype=bool), np.zeros((m, 3))
     for sign in (-1, 1):
-        first = sign * x_pad >= touch[sign][k] - config.contact_depth
+        first = side[sign] & (sign * x_pad >= touch[sign][k] - config.contact_depth)
         facing = np.maximum(sign * normal_x[first], 0.0) ** 2
         total = np.bincount(k[first], facing, m)
         mean = total / np.maximum(np.bincount(k[first], minlength=m), 1)
@@ -247,6 +265,7 @@ def _evaluate_columns(
         "offset": -config.weight_offset * arm / 0.1,
         "opening": -config.weight_opening * out.width[rows] / gripper.max_width,
         "mixed": -config.weight_mixed * other / np.maximum(np.bincount(k, minlength=m), 1),
+        "tight": -config.weight_tight * tight,
         "burden": -config.weight_burden * burden,
     }
     for name, term in terms.items():
