@@ -56,9 +56,9 @@ def test_urls_mean_the_same_file_to_us_and_to_drake():
 
 
 def test_spheres_are_those_of_the_file():
-    for model in list_models():
-        raw = yaml.safe_load((model.path.parent / "spheres.yaml").read_text())
-        spheres = load_spheres(model.name)
+    for name in ("wsg50", "banana", "foam_brick"):
+        raw = yaml.safe_load((DATA / name / "spheres.yaml").read_text())
+        spheres = load_spheres(name)
         assert set(spheres) == set(raw)
         for link, rows in raw.items():
             np.testing.assert_array_equal(spheres[link], rows)

@@ -77,7 +77,11 @@ def test_sections_become_drakes_structs_as_drake_reads_them():
     for ours, theirs in zip(scenario.directives, drakes, strict=True):
         assert repr(ours) == repr(theirs)
     weld = scenario.directives[3].add_weld
-    np.testing.assert_array_equal(weld.X_PC.rotation.value.deg, [90, 0, 90])
+    assert weld is not None
+    assert weld.X_PC is not None
+    X_PC = weld.X_PC.GetDeterministicValue()
+    # The hand's y, to the finger tips, is the flange's z.
+    np.testing.assert_allclose(X_PC.rotation().matrix()[:, 1], [0, 0, 1], atol=1e-12)
     assert isinstance(scenario.model_drivers["iiwa"], IiwaDriver)
     assert isinstance(scenario.model_drivers["wsg"], SchunkWsgDriver)
     camera = scenario.cameras["camera0"]
@@ -130,9 +134,10 @@ directives:
 
     def pose(seed: int):
         (directive,) = loads_scenario(text.format(seed)).directives
+        assert directive.add_model is not None
         return directive.add_model.default_free_body_pose["base_link"]
 
-    p = pose(3).GetDeterministicValue().translation()
+    p = np.asarray(pose(3).GetDeterministicValue().translation())
     assert pose(3).base_frame == "world"
     assert (p >= [1, 2, 3]).all()
     assert (p <= [2, 3, 4]).all()

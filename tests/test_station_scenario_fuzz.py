@@ -55,9 +55,11 @@ def mutations(draw: st.DrawFn) -> str:
 def read(text: str) -> None:
     try:
         loads_scenario(text)
+        return
     except InputError as error:
-        assert error.findings
-        assert all(finding.message for finding in error.findings)
+        findings = error.findings
+    assert findings
+    assert all(finding.message for finding in findings)
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])

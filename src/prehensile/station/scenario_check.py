@@ -18,7 +18,7 @@ from prehensile.station.schema import check
 from prehensile.yaml_lines import Node, close_to, number, read_yaml_file
 
 _MAX_DEPTH = 20  # directive files that add each other
-_MAX_FILES = 500  # directive files in all
+_MAX_FILES = 100  # directive files in all
 
 _REQUIRED = {
     "add_model": ("name", "file"),
