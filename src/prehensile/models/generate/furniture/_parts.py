@@ -15,8 +15,6 @@ from prehensile.models.generate.sdf_model import (
     Visual,
 )
 
-Rgba = tuple[float, float, float, float]
-
 
 @dataclass(frozen=True)
 class Block:
@@ -49,11 +47,6 @@ def inertial(mass: float, blocks: Sequence[Block]) -> Inertial:
 def collisions(blocks: Sequence[Block], contact: Contact) -> tuple[Collision, ...]:
     """The blocks as collision shapes."""
     return tuple(Collision(b.name, b.shape, b.pose, contact) for b in blocks)
-
-
-def plain_visuals(blocks: Sequence[Block], rgba: Rgba) -> tuple[Visual, ...]:
-    """The blocks as they are."""
-    return tuple(Visual(b.name, b.shape, b.pose, rgba) for b in blocks)
 
 
 def link(

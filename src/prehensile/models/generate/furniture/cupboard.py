@@ -6,10 +6,12 @@ both doors.
 
 from pathlib import Path
 
+import numpy as np
+
 from prehensile.models.generate import solids
 from prehensile.models.generate.files import write_description, write_spheres, write_text
 from prehensile.models.generate.furniture import _carcass
-from prehensile.models.generate.furniture._parts import Block, link, plain_visuals
+from prehensile.models.generate.furniture._parts import Block, link
 from prehensile.models.generate.sdf_model import (
     Collision,
     Contact,
@@ -23,6 +25,16 @@ from prehensile.models.generate.sdf_model import (
     sdf_text,
 )
 from prehensile.models.generate.sphere_cover import cover_model
+from prehensile.models.shapes import (
+    Material,
+    Part,
+    circle,
+    cylinder,
+    merge,
+    rounded_box,
+    sweep,
+    write_gltf,
+)
 
 GAP = 0.003  # m, between the doors, and between them and the carcass
 DOOR = 0.018  # m, thickness of the doors
@@ -38,6 +50,8 @@ STAND_OFF = 0.045  # m, from the front of the door to the middle of the bar
 HANDLE_Y = DOOR_WIDTH - 0.045  # m, from the hinge
 HANDLE_Z = _carcass.HEIGHT / 2  # m
 
+PAINT = Material("paint", (0.60, 0.66, 0.65, 1.0), roughness=0.55)
+STEEL_GREY = Material("steel", (0.30, 0.31, 0.33, 1.0), roughness=0.4)
 STEEL = Contact(mu=0.7, hydroelastic="rigid", resolution=0.004, relaxation_time=0.02)
 
 
@@ -55,16 +69,12 @@ def door(name: str, side: int) -> Link:
         for s in (-1, 1)
     ]
     handle = [("handle", bar), ("post_low", posts[0]), ("post_high", posts[1])]
-    grey = (0.45, 0.46, 0.48, 1.0)
     pose: Pose = (HINGE_X, side * HINGE_Y, 0.0, 0.0, 0.0, 0.0)
     return Link(
         name,
         pose,
         solids.body(DOOR_MASS, [(slab.shape, slab.pose)]),
-        (
-            *plain_visuals([slab], (0.86, 0.87, 0.85, 1.0)),
-            *(Visual(n, *part, rgba=grey) for n, part in handle),
-        ),
+        (Visual("door", Shape("mesh", uri=f"{name}.gltf")),),
         (
             Collision("slab", slab.shape, slab.pose, _carcass.WOOD),
             *(Collision(n, *part, STEEL) for n, part in handle),
@@ -75,7 +85,7 @@ def door(name: str, side: int) -> Link:
 def model() -> Model:
     """The cupboard."""
     parts = _carcass.blocks()
-    visuals = plain_visuals(parts, (0.80, 0.68, 0.50, 1.0))
+    visuals = (Visual("carcass", Shape("mesh", uri="carcass.gltf")),)
     body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals)
     # Left and right as seen by one who stands before the cupboard and looks at it.
     left, right = door("left_door", -1), door("right_door", 1)
@@ -103,9 +113,44 @@ def model() -> Model:
     return Model("cupboard", comment, (body, left, right), joints, frames)
 
 
+def door_parts(side: int) -> list[Part]:
+    """A painted door with a bow handle and two hinges; ``side`` as in ``door``."""
+    height = _carcass.HEIGHT - 2 * GAP
+    width = DOOR_WIDTH + DOOR / 2
+    middle = -side * (width / 2 - DOOR / 2)
+    slab = rounded_box((DOOR, width, height), 0.003).transformed(p_AB=(0, middle, HANDLE_Z))
+    field = rounded_box((0.004, width - 0.1, height - 0.1), 0.0018, 2)
+    field = field.transformed(p_AB=(DOOR / 2 - 0.0005, middle, HANDLE_Z))
+    # The bow: out, up and back, with rounded corners.
+    reach, half, bend = STAND_OFF, BAR_LENGTH / 2, 0.016
+    turn = np.linspace(0.0, np.pi / 2, 6)
+    corner = np.column_stack([reach - bend * (1 - np.sin(turn)), -half + bend * (1 - np.cos(turn))])
+    path = np.concatenate([[[-0.002, -half]], corner, (corner * [1, -1])[::-1], [[-0.002, half]]])
+    y = -side * HANDLE_Y
+    points = np.column_stack([DOOR / 2 + path[:, 0], np.full(len(path), y), HANDLE_Z + path[:, 1]])
+    bow = sweep(points, circle(BAR, 16), up=(0.0, 1.0, 0.0), crease=np.pi)
+    roses = [
+        cylinder(0.011, 0.003, 24).transformed(
+            ((0, 0, 1), (1, 0, 0), (0, 1, 0)), (DOOR / 2 + 0.0015, y, HANDLE_Z + s * half)
+        )
+        for s in (-1, 1)
+    ]
+    hinges = [
+        cylinder(DOOR / 2 + 0.0008, 0.05, 20).transformed(p_AB=(0, 0, z))
+        for z in (0.12, _carcass.HEIGHT - 0.12)
+    ]
+    return [
+        Part(merge([slab, field]), PAINT),
+        Part(merge([bow, *roses, *hinges]), STEEL_GREY),
+    ]
+
+
 def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
+    write_gltf(folder / "carcass.gltf", _carcass.visual_parts())
+    write_gltf(folder / "left_door.gltf", door_parts(-1))
+    write_gltf(folder / "right_door.gltf", door_parts(1))
     write_text(folder / "cupboard.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     heights = ", ".join(f"{z:g}" for z in _carcass.floors())

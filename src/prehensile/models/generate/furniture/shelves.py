@@ -4,15 +4,16 @@ from pathlib import Path
 
 from prehensile.models.generate.files import write_description, write_spheres, write_text
 from prehensile.models.generate.furniture import _carcass
-from prehensile.models.generate.furniture._parts import link, plain_visuals
-from prehensile.models.generate.sdf_model import Model, sdf_text
+from prehensile.models.generate.furniture._parts import link
+from prehensile.models.generate.sdf_model import Model, Shape, Visual, sdf_text
 from prehensile.models.generate.sphere_cover import cover_model
+from prehensile.models.shapes import write_gltf
 
 
 def model() -> Model:
     """The shelves."""
     parts = _carcass.blocks()
-    visuals = plain_visuals(parts, (0.80, 0.68, 0.50, 1.0))
+    visuals = (Visual("shelves", Shape("mesh", uri="shelves.gltf")),)
     comment = "Shelves. The origin is the middle of the underside, z up, open to the front, +x."
     body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals)
     return Model("shelves", comment, (body,))
@@ -21,6 +22,7 @@ def model() -> Model:
 def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
+    write_gltf(folder / "shelves.gltf", _carcass.visual_parts())
     write_text(folder / "shelves.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     heights = ", ".join(f"{z:g}" for z in _carcass.floors())

@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from prehensile.models.generate.files import write_description, write_spheres, write_text
-from prehensile.models.generate.furniture._parts import Block, link, plain_visuals
-from prehensile.models.generate.sdf_model import Contact, Model, sdf_text
+from prehensile.models.generate.furniture import _wood
+from prehensile.models.generate.furniture._parts import Block, link
+from prehensile.models.generate.sdf_model import Contact, Model, Shape, Visual, sdf_text
 from prehensile.models.generate.sphere_cover import cover_model
+from prehensile.models.shapes import Material, Part, cylinder, merge, rounded_box, write_gltf
 
 LENGTH, WIDTH, HEIGHT = 1.8, 1.6, 0.75  # m, along x, y, z
 PLATE = 0.05  # m, thickness of the top
@@ -35,15 +37,41 @@ def blocks() -> list[Block]:
 def model() -> Model:
     """The table."""
     parts = blocks()
-    visuals = plain_visuals(parts[:1], (0.78, 0.74, 0.68, 1.0))
-    visuals += plain_visuals(parts[1:], (0.35, 0.37, 0.4, 1.0))
+    visuals = (Visual("table", Shape("mesh", uri="table.gltf")),)
     comment = "A work table. The origin is the middle of its top surface, z up, x along the length."
     return Model("table", comment, (link("base_link", MASS, parts, LAMINATE, visuals),))
+
+
+def visual_parts() -> list[Part]:
+    """A plate of glued staves on a frame of steel tube with feet."""
+    top, *legs = blocks()
+    plate = _wood.board(top, 0, 0.006)
+    steel = []
+    for leg in legs:
+        size = leg.shape.size
+        tube = rounded_box((size[0], size[1], size[2] - 0.03), 0.006, 2)
+        steel.append(tube.transformed(p_AB=(*leg.pose[:2], leg.pose[2] + 0.015)))
+    x, y = LENGTH / 2 - INSET - LEG / 2, WIDTH / 2 - INSET - LEG / 2
+    for z, height, depth in ((-PLATE - 0.04, 0.08, 0.04), (-HEIGHT + 0.16, 0.05, 0.03)):
+        for s in (-1, 1):
+            along = rounded_box((2 * x - LEG, depth, height), 0.004, 2)
+            steel.append(along.transformed(p_AB=(0, s * y, z)))
+            across = rounded_box((depth, 2 * y - LEG, height), 0.004, 2)
+            steel.append(across.transformed(p_AB=(s * x, 0, z)))
+    foot = cylinder(0.035, 0.03, 24, rounding=0.006)
+    feet = merge(foot.transformed(p_AB=(*leg.pose[:2], -HEIGHT + 0.015)) for leg in legs)
+    texture = _wood.grain((240, 222, 190), (196, 164, 122), seed=3)
+    return [
+        Part(plate, _wood.wood("beech", texture)),
+        Part(merge(steel), Material("steel", (0.10, 0.115, 0.13, 1.0), roughness=0.5)),
+        Part(feet, Material("rubber", (0.02, 0.02, 0.02, 1.0), roughness=0.9)),
+    ]
 
 
 def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
+    write_gltf(folder / "table.gltf", visual_parts())
     write_text(folder / "table.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     write_description(

@@ -112,7 +112,7 @@ def collisions(arm: Arm) -> list[tuple[Collision, ...]]:
     rise = [arm.axes[i + 1].pose[2] - arm.axes[i].pose[2] for i in range(6)]
     foot = Collision(
         "foot",
-        Shape("cylinder", (0.1 * shoulder / 0.068, 0.1575)),
+        Shape("cylinder", (0.093 if shoulder < 0.08 else 0.11, 0.1575)),
         (0.0, 0.0, 0.07875, 0.0, 0.0, 0.0),
         METAL,
     )
@@ -124,19 +124,20 @@ def collisions(arm: Arm) -> list[tuple[Collision, ...]]:
         METAL,
     )
 
+    # The tubes run on into the links that they turn against, where their round ends are hidden.
     def rising(drum: float, height: float, side: float) -> tuple[Collision, ...]:
         """An odd link: tube up from its own axis, drum on the next axis, off to one side."""
-        off = side * (0.1146 - 0.068 if drum < 0.08 else 0.1157 - drum + 0.02)
+        off = side * (_iiwa_shape.reach(drum, even=False) - drum)
         return (
-            capsule("tube", drum, (0.0, 0.0, drum - 0.01), (0.0, off, height)),
+            capsule("tube", drum, (0.0, 0.0, 0.03), (0.0, off, height - 0.01)),
             capsule("drum", drum - 0.004, (0.0, off, height), (0.0, 0.0, height)),
         )
 
-    def standing(drum: float, tube: float, height: float) -> tuple[Collision, ...]:
+    def standing(drum: float, tube: float, length: float) -> tuple[Collision, ...]:
         """An even link: drum on its own axis, tube along y up to the next axis."""
-        off = 0.1146 - 0.068 if drum < 0.08 else 0.0466
+        off = _iiwa_shape.reach(drum, even=True) - drum
         return (
-            capsule("tube", tube, (0.0, 0.0, off), (0.0, height - tube, 0.0)),
+            capsule("tube", 0.5 * (drum + tube), (0.0, 0.0, off), (0.0, length - 0.03, 0.0)),
             capsule("drum", drum - 0.004, (0.0, 0.0, off), (0.0, 0.0, 0.0)),
         )
 
@@ -147,7 +148,7 @@ def collisions(arm: Arm) -> list[tuple[Collision, ...]]:
         rising(elbow, rise[2], 1.0),
         standing(elbow, elbow, rise[3]),
         (
-            capsule("tube", 0.066, (0.0, 0.0, 0.056), (0.0, 0.015, 0.09)),
+            capsule("tube", 0.066, (0.0, 0.0, 0.03), (0.0, 0.015, 0.09)),
             Collision(
                 "arm", Shape("box", (0.1, 0.03, 0.16)), (0.0, 0.083, 0.185, 0.0, 0.0, 0.0), METAL
             ),

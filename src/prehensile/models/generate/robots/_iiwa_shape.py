@@ -27,7 +27,7 @@ DARK = Material("dark", (0.045, 0.047, 0.05, 1.0), metallic=0.0, roughness=0.6)
 
 STEP = 0.0088  # m, edge of the triangles
 GAP = 0.0018  # m, half of what is between two links
-FLOW = 0.055  # m, width of the fillets between tube and drum
+FLOW = 0.048  # m, width of the fillets between tube and drum
 
 R_YZ = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # turns z to y
 
@@ -58,7 +58,8 @@ def base(radius: float, foot: float, back: float) -> list[Part]:
 
 def rising(radius: float, height: float, side: float) -> list[Part]:
     """Links 1 and 3: up along z from their own joint, drum on the next, on the ``side`` of y."""
-    off, outer = side * _offset(radius), side * _outer(radius)
+    outer = side * reach(radius, False)
+    off = outer - side * radius
     tube = _swaying(2, 1, (0.02, height - 0.035), (0.0, off), (radius, radius), height)
     head = drum((0, outer, height), (0, -side * 0.08, height), radius, 0.82 * radius)
     body = union(tube, head, blend=FLOW)
@@ -71,7 +72,8 @@ def rising(radius: float, height: float, side: float) -> list[Part]:
 
 def standing(radius: float, tube: float, length: float) -> list[Part]:
     """Links 2 and 4: drum on their own joint, tube along y; an orange cover on the drum."""
-    off, outer = _offset(radius), _outer(radius)
+    outer = reach(radius, True)
+    off = outer - radius
     neck = _swaying(1, 2, (0.035, length - 0.02), (off, 0.0), (radius, tube), 0.0)
     head = drum((0, 0, outer), (0, 0, -0.08), radius, 0.82 * radius)
     body = union(neck, head, blend=FLOW)
@@ -79,7 +81,7 @@ def standing(radius: float, tube: float, length: float) -> list[Part]:
     shell = _housing(body, length + radius)
     shell = _kept(split(shell, other, body)[1])
     shell = _kept(split(shell, lambda p: p[..., 1] - (length - GAP), body)[0])
-    edge = 0.45 * outer
+    edge = 0.46 * outer
     rest, cover = split(shell, lambda p: p[..., 2] - edge - 0.36 * p[..., 1], body)
     return [
         Part(_kept(rest), SILVER),
@@ -179,14 +181,16 @@ def links(heights: Sequence[float], drums: tuple[float, float], face: float) -> 
     ]
 
 
-def _offset(radius: float) -> float:
-    """Of the middle of a drum's outer end from the axis of the tube, m."""
-    return 0.0466 if radius < 0.08 else 0.045
+def reach(radius: float, even: bool) -> float:
+    """How far the drum of a link reaches to the side of the tube's joint, m.
 
-
-def _outer(radius: float) -> float:
-    """How far a drum reaches to the side, m."""
-    return 0.1146 if radius < 0.08 else 0.1325
+    Args:
+        radius: of the drum.
+        even: whether the link's number is.
+    """
+    if radius < 0.08:
+        return 0.109
+    return 0.124 if even else 0.116
 
 
 def _housing(body: Field, reach: float) -> Mesh:

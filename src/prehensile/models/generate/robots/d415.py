@@ -20,6 +20,15 @@ from prehensile.models.generate.sdf_model import (
     sdf_text,
 )
 from prehensile.models.generate.sphere_cover import cover_model
+from prehensile.models.shapes import (
+    Material,
+    Part,
+    cylinder,
+    extrude,
+    merge,
+    rounded_rectangle,
+    write_gltf,
+)
 
 DEPTH, WIDTH, HEIGHT = 0.02, 0.099, 0.023  # m, along x, y, z
 MASS = 0.072  # kg
@@ -36,7 +45,7 @@ def model() -> Model:
     body = Link(
         "base_link",
         inertial=solids.body(MASS, [(block, middle)]),
-        visuals=(Visual("body", block, middle, (0.75, 0.76, 0.78, 1.0)),),
+        visuals=(Visual("body", Shape("mesh", uri="body.gltf")),),
         collisions=(Collision("body", block, middle, Contact(mu=0.4, relaxation_time=0.05)),),
     )
     x, z = DEPTH / 2 - BEHIND_GLASS, HEIGHT / 2
@@ -48,9 +57,38 @@ def model() -> Model:
     return Model("d415", comment, (body,), frames=tuple(frames))
 
 
+def parts() -> list[Part]:
+    """The housing, the glass in its front and the lenses behind the glass."""
+    to_x = ((0, 0, 1), (1, 0, 0), (0, 1, 0))  # turns the outline's x, y to y, z
+    middle, front = HEIGHT / 2, DEPTH / 2
+    shell = extrude(
+        rounded_rectangle(WIDTH, HEIGHT, 0.0105, 6), DEPTH - 0.0004, bevel=0.0022
+    ).transformed(to_x, (-front, 0, middle))
+    glass = extrude(rounded_rectangle(0.091, 0.0165, 0.008, 6), 0.001).transformed(
+        to_x, (front - 0.0008, 0, middle)
+    )
+    lenses, rims = [], []
+    for y, radius in (
+        (COLOR_Y, 0.0032),
+        (LEFT_IMAGER_Y, 0.0042),
+        (-0.008, 0.0046),
+        (RIGHT_IMAGER_Y, 0.0042),
+    ):
+        rims.append(cylinder(radius + 0.0009, 0.0003, 24).transformed(to_x, (front, y, middle)))
+        lenses.append(cylinder(radius, 0.0005, 24).transformed(to_x, (front, y, middle)))
+    thread = cylinder(0.0032, 0.001, 20)
+    return [
+        Part(shell, Material("aluminium", (0.66, 0.67, 0.69, 1.0), roughness=0.45)),
+        Part(glass, Material("glass", (0.012, 0.012, 0.014, 1.0), roughness=0.2)),
+        Part(merge(rims), Material("rim", (0.05, 0.05, 0.055, 1.0), roughness=0.5)),
+        Part(merge([*lenses, thread]), Material("lens", (0.02, 0.03, 0.07, 1.0), roughness=0.1)),
+    ]
+
+
 def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
+    write_gltf(folder / "body.gltf", parts())
     write_text(folder / "d415.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.01))
     write_description(

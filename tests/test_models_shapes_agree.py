@@ -1,0 +1,62 @@
+"""What touches, what is seen and what planners test: the three shapes of a model agree."""
+
+import numpy as np
+import pytest
+from model_checks import scene, visual_files
+from scipy.spatial import cKDTree
+
+from prehensile.models.registry import load_spheres
+from prehensile.models.shapes import read_gltf
+
+MODELS = ("iiwa7", "iiwa14", "wsg50", "d415", "table", "bin", "shelves", "cupboard")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_spheres_cover_the_collision_shapes_closely(name: str) -> None:
+    made = scene(name)
+    rng = np.random.default_rng(5)
+    directions = rng.normal(size=(24, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for body, rows in load_spheres(name).items():
+        low = (rows[:, :3] - rows[:, 3:]).min(axis=0)
+        high = (rows[:, :3] + rows[:, 3:]).max(axis=0)
+        points = [rng.uniform(low, high, size=(800, 3)), made.surface_points(body, rng, 300)]
+        for p_B in np.concatenate(points):
+            if made.distance(body, p_B) < 1e-6:
+                gaps = np.linalg.norm(rows[:, :3] - p_B, axis=1) - rows[:, 3]
+                assert gaps.min() <= 1e-6
+        for row in rows[rng.permutation(len(rows))[:60]]:
+            out = [made.distance(body, row[:3] + row[3] * u) for u in directions]
+            assert max(out) < 0.04
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_is_seen_is_what_touches(name: str) -> None:
+    # To within what a planner or a camera would notice; the walls of the bin are thick on
+    # purpose, and rails between the legs of the table do not touch.
+    made = scene(name)
+    rng = np.random.default_rng(6)
+    for body, file in visual_files(name).items():
+        vertices = np.concatenate([part.mesh.vertices for part in read_gltf(file)])
+        assert file.stat().st_size < 300_000
+        seen = vertices[rng.permutation(len(vertices))[:400]]
+        if name == "table":
+            seen = seen[seen[:, 2] > -0.04]
+        outside = [made.distance(body, p_B) for p_B in seen]
+        assert max(outside) < 0.03
+        # Large faces have vertices at their borders only.
+        on_faces = np.concatenate(
+            [part.mesh.vertices[part.mesh.faces].mean(axis=1) for part in read_gltf(file)]
+        )
+        if name.startswith("iiwa"):
+            tree = cKDTree(np.concatenate([vertices, on_faces]))
+            touching = made.surface_points(body, rng, 300)
+            touching = touching[(body != "iiwa_link_0") | (touching[:, 2] > 0.01)]  # the open foot
+            assert tree.query(touching)[0].max() < 0.04
+        else:
+            slack = {"wsg50": 0.012, "bin": 0.002}.get(name, 0.004)
+            _, shapes = made.shapes(body)
+            touching = made.surface_points(body, rng, 300)
+            np.testing.assert_array_less(vertices.min(axis=0) - slack, touching.min(axis=0))
+            np.testing.assert_array_less(touching.max(axis=0), vertices.max(axis=0) + slack)
+            assert shapes
