@@ -33,7 +33,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from prehensile.station.cameras import add_cameras
 from prehensile.station.drivers import Site, driver_of
 from prehensile.station.hardware import build_interface
-from prehensile.station.robot_plant import add_models
+from prehensile.station.robot_plant import add_models, finalize
 from prehensile.station.scenario import Scenario
 from prehensile.station.visualization import add_visualization
 
@@ -72,7 +72,7 @@ def build(scenario: Scenario, *, meshcat: Meshcat | None = None, hardware: bool 
     for driver, site in drivers:
         if driver.prepare is not None:
             driver.prepare(site)
-    plant.Finalize()
+    finalize(scenario, plant)
     for driver, site in drivers:
         driver.simulate(site)
     add_cameras(scenario, builder, plant, scene_graph)

@@ -18,6 +18,7 @@ from pydrake.geometry import (
     RenderEngineGlParams,
     RenderEngineGltfClientParams,
     RenderEngineVtkParams,
+    Role,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -94,14 +95,24 @@ def add_cameras(
         scenario: the scenario.
         builder: the station's diagram.
         plant: the finalized plant.
-        scene_graph: the scene graph; renderers that it lacks are added.
+        scene_graph: the scene graph with all of the geometry.
 
     Raises:
         InputError: settings that Drake refuses, an unknown frame, or a name used twice.
     """
+    if not scenario.cameras:
+        return
+    # A scene graph moves the geometry of its renderers whenever anything asks it anything, at
+    # every step that is. A copy of it, asked by the cameras alone, leaves that until they look.
+    visible = builder.AddNamedSystem("camera_scene_graph", scene_graph.Clone())
+    source = plant.get_source_id()
+    for geometry in visible.model_inspector().GetAllGeometryIds(Role.kProximity):
+        visible.RemoveRole(source, geometry, Role.kProximity)
+    builder.Connect(plant.get_geometry_pose_output_port(), visible.get_source_pose_port(source))
     for key, config in scenario.cameras.items():
-        _add_renderer(scenario, key, scene_graph)
-        sensor = add_sensor(scenario, key, builder, plant, scene_graph)
+        if not visible.HasRenderer(config.renderer_name):
+            visible.AddRenderer(config.renderer_name, _make_renderer(scenario, key))
+        sensor = add_sensor(scenario, key, builder, plant, visible)
         add_camera_ports(
             builder,
             config,
@@ -210,12 +221,6 @@ def add_camera_ports(
         ("X_WC", pose),
     ):
         builder.ExportOutput(port, f"{config.name}.{name}")
-
-
-def _add_renderer(scenario: Scenario, key: str, scene_graph: SceneGraph) -> None:
-    config = scenario.cameras[key]
-    if not scene_graph.HasRenderer(config.renderer_name):
-        scene_graph.AddRenderer(config.renderer_name, _make_renderer(scenario, key))
 
 
 def _make_renderer(scenario: Scenario, key: str) -> RenderEngine:

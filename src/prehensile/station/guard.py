@@ -8,12 +8,13 @@ import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, InputPort, LeafSystem
 
 from prehensile.errors import Finding, InputError
 
@@ -281,87 +282,148 @@ def guard_step(
     )
 
 
+@dataclass(frozen=True)
+class _Group:
+    """One model's joints in the guard: its limits, and where its ports and state are.
+
+    The discrete state ``memory`` holds n last commands, n velocities, and one number that tells
+    whether the next update would change nothing: _SETTLED if the same command comes again,
+    _WAITING if again there is none.
+    """
+
+    limits: GuardLimits
+    period: float
+    timeout: float
+    start: np.ndarray
+    command: InputPort
+    effort: InputPort
+    time: InputPort
+    measured: InputPort
+    positions: int
+    efforts: int
+    status: int
+    memory: int
+
+
+_SETTLED, _WAITING = 1.0, 2.0
+
+
 class JointGuard(LeafSystem):
-    """Samples :func:`guard_step` at the command rate.
+    """Samples :func:`guard_step` at the command rate, for any number of models.
 
-    Input ports::
+    Input ports of each model that is added::
 
-        position (n)          commanded positions; may stay unconnected (then the joints hold)
-        effort (n)            commanded feed-forward efforts; may stay unconnected
-        command_time (1)      time stamp of the command on the station's clock [s]; optional
-        position_measured (n) where the joints are; read once, at the start
+        MODEL.position (n)          commanded positions; may stay unconnected (the joints hold)
+        MODEL.effort (n)            feed-forward efforts; may stay unconnected
+        MODEL.command_time (1)      time stamp of the command on the station's clock [s]; optional
+        MODEL.measured (n or more)  where the joints are; read once, at the start
 
     Output ports, all of them state (nothing is computed when they are read)::
 
-        position (n), effort (n)
-        status (1)            a :class:`GuardStatus` as a float
+        MODEL.position (n), MODEL.effort (n)
+        MODEL.status (1)            a :class:`GuardStatus` as a float
 
-    Args:
-        limits: the limits.
-        period: seconds between two commands (> 0).
-        timeout: age in seconds at which a command with a time stamp is stale (> 0).
-        default_position: n positions put out before the start; zeros by default.
+    It is one system for all models because a system written in Python costs something at every
+    step of a simulation, whether it does anything or not.
     """
 
-    def __init__(
+    def add(
         self,
+        model: str,
         limits: GuardLimits,
         *,
         period: float = COMMAND_PERIOD,
         timeout: float = COMMAND_TIMEOUT,
-        default_position: np.ndarray | None = None,
+        default_position: Sequence[float] | np.ndarray | None = None,
+        measured_size: int | None = None,
     ) -> None:
-        super().__init__()
+        """Adds the joints of a model.
+
+        Args:
+            model: first part of the ports' names.
+            limits: the limits.
+            period: seconds between two commands (> 0).
+            timeout: age in seconds at which a command with a time stamp is stale (> 0).
+            default_position: n positions put out before the start; zeros by default.
+            measured_size: size of the measured port, of which the first n values count; n by
+                default.
+        """
         n = limits.size
-        self._limits, self._period, self._timeout = limits, period, timeout
-        self.DeclareVectorInputPort("position", n)
-        self.DeclareVectorInputPort("effort", n)
-        self.DeclareVectorInputPort("command_time", 1)
-        self.DeclareVectorInputPort("position_measured", n)
-        self._start = np.zeros(n) if default_position is None else np.asarray(default_position)
-        # Groups of the discrete state: position, effort, status, (velocity, last command).
-        position = self.DeclareDiscreteState(self._start)
-        effort = self.DeclareDiscreteState(np.asarray(limits.effort_default))
+        start = np.array(np.zeros(n) if default_position is None else default_position, float)
+        position = self.DeclareDiscreteState(start)
+        effort = self.DeclareDiscreteState(np.array(limits.effort_default))
         status = self.DeclareDiscreteState(np.array([float(GuardStatus.UNCONNECTED)]))
-        self.DeclareDiscreteState(np.concatenate([np.zeros(n), self._start]))
-        self.DeclareStateOutputPort("position", position)
-        self.DeclareStateOutputPort("effort", effort)
-        self.DeclareStateOutputPort("status", status)
-        self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        memory = self.DeclareDiscreteState(np.concatenate([start, np.zeros(n + 1)]))
+        self.DeclareStateOutputPort(f"{model}.position", position)
+        self.DeclareStateOutputPort(f"{model}.effort", effort)
+        self.DeclareStateOutputPort(f"{model}.status", status)
+        group = _Group(
+            limits=limits,
+            period=period,
+            timeout=timeout,
+            start=start,
+            command=self.DeclareVectorInputPort(f"{model}.position", n),
+            effort=self.DeclareVectorInputPort(f"{model}.effort", n),
+            time=self.DeclareVectorInputPort(f"{model}.command_time", 1),
+            measured=self.DeclareVectorInputPort(f"{model}.measured", measured_size or n),
+            positions=int(position),
+            efforts=int(effort),
+            status=int(status),
+            memory=int(memory),
+        )
+        self.DeclareInitializationDiscreteUpdateEvent(partial(_initialize, group))
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, partial(_update, group))
 
-    def _initialize(self, context: Context, values: DiscreteValues) -> None:
-        measured = self.EvalVectorInput(context, 3)
-        q = self._start if measured is None else measured.value()
-        if not np.isfinite(q).all():
-            q = self._start
-        values.set_value(0, q)
-        values.set_value(1, self._limits.effort_default)
-        values.set_value(2, [float(GuardStatus.UNCONNECTED)])
-        values.set_value(3, np.concatenate([np.zeros_like(q), q]))
 
-    def _update(self, context: Context, values: DiscreteValues) -> None:
-        # This is the one place in an idle station where Python runs: few calls, plain floats.
-        n = self._limits.size
-        command = self.EvalVectorInput(context, 0)
-        command = None if command is None else command.value().tolist()
-        effort = self.EvalVectorInput(context, 1)
-        effort = None if effort is None else effort.value().tolist()
-        stamp = self.EvalVectorInput(context, 2)
-        fresh = stamp is None or context.get_time() - stamp[0] <= self._timeout
-        position = values.value(0).tolist()
-        memory = values.value(3).tolist()
-        status = GuardStatus(int(values.value(2)[0]))
-        at_rest = not any(memory[:n])
-        if at_rest and effort is None and fresh:
-            if command == position == memory[n:] and status is GuardStatus.OK:
+def _initialize(group: _Group, context: Context, values: DiscreteValues) -> None:
+    """Holds the joints where they are."""
+    q = group.start
+    if group.measured.HasValue(context):
+        measured = group.measured.Eval(context)[: group.limits.size]
+        if np.isfinite(measured).all():
+            q = measured
+    values.set_value(group.positions, q)
+    values.set_value(group.efforts, group.limits.effort_default)
+    values.set_value(group.status, [float(GuardStatus.UNCONNECTED)])
+    values.set_value(group.memory, np.concatenate([q, np.zeros(len(q) + 1)]))
+
+
+def _update(group: _Group, context: Context, values: DiscreteValues) -> None:
+    # The one place where Python runs in an idle station, hence the short way out for it.
+    command = group.command.Eval(context) if group.command.HasValue(context) else None
+    has_effort = group.effort.HasValue(context)
+    stamp = group.time.Eval(context)[0] if group.time.HasValue(context) else None
+    fresh = stamp is None or context.get_time() - stamp <= group.timeout
+    memory = values.value(group.memory)
+    n = group.limits.size
+    if fresh and not has_effort:
+        if command is None:
+            if memory[-1] == _WAITING:
                 return
-            if command is None and status is GuardStatus.UNCONNECTED:
-                return
-        state = GuardState(position, memory[:n], (), memory[n:], status)
-        state = guard_step(state, command, effort, self._limits, self._period, fresh=fresh)
-        values.set_value(0, state.position)
-        values.set_value(1, state.effort)
-        if state.status is not status:
-            values.set_value(2, [float(state.status)])
-        values.set_value(3, [*state.velocity, *state.command])
+        elif memory[-1] == _SETTLED and command.tobytes() == memory[:n].tobytes():
+            return
+    state = GuardState(
+        position=values.value(group.positions).tolist(),
+        velocity=memory[n : 2 * n].tolist(),
+        effort=(),
+        command=memory[:n].tolist(),
+        status=GuardStatus(int(values.value(group.status)[0])),
+    )
+    state = guard_step(
+        state,
+        None if command is None else command.tolist(),
+        group.effort.Eval(context).tolist() if has_effort else None,
+        group.limits,
+        group.period,
+        fresh=fresh,
+    )
+    settled = 0.0
+    if not any(state.velocity):
+        if state.status is GuardStatus.OK and state.position == state.command:
+            settled = _SETTLED
+        elif state.status is GuardStatus.UNCONNECTED:
+            settled = _WAITING
+    values.set_value(group.positions, state.position)
+    values.set_value(group.efforts, state.effort)
+    values.set_value(group.status, [float(state.status)])
+    values.set_value(group.memory, [*state.command, *state.velocity, settled])

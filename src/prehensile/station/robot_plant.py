@@ -67,6 +67,18 @@ def add_models(
         raise _directives_error(scenario, error) from error
 
 
+def finalize(scenario: Scenario, plant: MultibodyPlant) -> None:
+    """Finalizes a plant that :func:`add_models` has filled.
+
+    Raises:
+        InputError: Drake refuses the whole, for instance because welds close a loop.
+    """
+    try:
+        plant.Finalize()
+    except (RuntimeError, SystemExit) as error:
+        raise _directives_error(scenario, error) from error
+
+
 def make_robot_plant(
     scenario: Scenario, model_names: Iterable[str], *, frozen_children: bool = False
 ) -> MultibodyPlant:

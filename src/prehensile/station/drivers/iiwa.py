@@ -17,8 +17,8 @@ from pydrake.systems.framework import OutputPort
 from pydrake.systems.lcm import LcmPublisherSystem, LcmSubscriberSystem
 from pydrake.systems.primitives import Gain, Multiplexer, SharedPointerSystem
 
-from prehensile.station.drivers.site import Driver, Site
-from prehensile.station.guard import COMMAND_PERIOD, GuardLimits, JointGuard
+from prehensile.station.drivers.site import Driver, GuardPorts, Site
+from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
 from prehensile.station.robot_plant import make_robot_plant
 
 _TORQUE_PERIOD = 0.001  # s; the driver takes commands at 1 kHz if they are torques alone
@@ -54,7 +54,7 @@ def _check(site: Site) -> IiwaControlMode:
     return mode
 
 
-def _add_guard(site: Site, mode: IiwaControlMode, measured: OutputPort) -> JointGuard:
+def _add_guard(site: Site, mode: IiwaControlMode, measured: OutputPort) -> GuardPorts:
     return site.add_guard(
         GuardLimits.of_plant(site.plant, site.instance),
         measured,
@@ -81,9 +81,9 @@ def _simulate(site: Site) -> None:
     driver.set_name(f"{site.name}.driver")
     guard = _add_guard(site, mode, driver.GetOutputPort("position_measured"))
     if position_enabled(mode):
-        builder.Connect(guard.GetOutputPort("position"), driver.GetInputPort("position"))
+        builder.Connect(guard.position, driver.GetInputPort("position"))
     if torque_enabled(mode):
-        builder.Connect(guard.GetOutputPort("effort"), driver.GetInputPort("torque"))
+        builder.Connect(guard.effort, driver.GetInputPort("torque"))
     for name in (*_MEASUREMENTS, "state_estimated"):
         site.export_output(driver.GetOutputPort(name), name)
 
@@ -119,9 +119,9 @@ def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
     )
     builder.Connect(sender.get_output_port(), publisher.get_input_port())
     if position_enabled(mode):
-        builder.Connect(guard.GetOutputPort("position"), sender.get_position_input_port())
+        builder.Connect(guard.position, sender.get_position_input_port())
     if torque_enabled(mode):
-        builder.Connect(guard.GetOutputPort("effort"), sender.get_torque_input_port())
+        builder.Connect(guard.effort, sender.get_torque_input_port())
 
     for port_name in _MEASUREMENTS:
         port = receiver.GetOutputPort(port_name)

@@ -23,7 +23,7 @@ from pydrake.systems.primitives import (
     StateInterpolatorWithDiscreteDerivative,
 )
 
-from prehensile.station.drivers.site import Driver, Site
+from prehensile.station.drivers.site import Driver, GuardPorts, Site
 from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
 from prehensile.station.robot_plant import make_robot_plant
 
@@ -137,7 +137,9 @@ def _connect_actuation(site: Site, effort: OutputPort) -> None:
         )
 
 
-def _command(site: Site, state: OutputPort, desired_state: InputPort, *, effort: bool):
+def _command(
+    site: Site, state: OutputPort, desired_state: InputPort, *, effort: bool
+) -> GuardPorts:
     """Adds the guard and what makes a desired state of its positions; exports the ports."""
     limits = _joint_limits(site)
     n = limits.size
@@ -155,9 +157,9 @@ def _command(site: Site, state: OutputPort, desired_state: InputPort, *, effort:
         f"{site.name}.desired",
         StateInterpolatorWithDiscreteDerivative(n, COMMAND_PERIOD, suppress_initial_transient=True),
     )
-    builder.Connect(guard.GetOutputPort("position"), derivative.get_input_port())
+    builder.Connect(guard.position, derivative.get_input_port())
     builder.Connect(derivative.get_output_port(), desired_state)
-    site.export_output(guard.GetOutputPort("position"), "position_commanded")
+    site.export_output(guard.position, "position_commanded")
     site.export_output(split.get_output_port(0), "position_measured")
     site.export_output(split.get_output_port(1), "velocity_estimated")
     site.export_output(state, "state_estimated")
@@ -216,7 +218,7 @@ def _simulate_stiffness(site: Site) -> None:
     )
     total = builder.AddNamedSystem(f"{site.name}.effort", Adder(2, plant.num_velocities()))
     builder.Connect(gravity.get_output_port_generalized_force(), total.get_input_port(0))
-    builder.Connect(guard.GetOutputPort("effort"), total.get_input_port(1))
+    builder.Connect(guard.effort, total.get_input_port(1))
     _connect_actuation(site, total.get_output_port())
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from pydrake.lcm import DrakeLcmInterface
@@ -13,6 +13,18 @@ from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from prehensile.errors import Finding, InputError
 from prehensile.station.guard import COMMAND_PERIOD, GuardLimits, JointGuard
 from prehensile.station.scenario import Scenario
+
+
+class GuardPorts(NamedTuple):
+    """What comes out of the guard, to be sent on to the joints.
+
+    Attributes:
+        position: n positions.
+        effort: n efforts.
+    """
+
+    position: OutputPort
+    effort: OutputPort
 
 
 @dataclass(frozen=True)
@@ -100,31 +112,47 @@ class Site:
         position: bool = True,
         period: float = COMMAND_PERIOD,
         default_position: np.ndarray | None = None,
-    ) -> JointGuard:
-        """Adds the guard and exports its ports.
+    ) -> GuardPorts:
+        """Adds the model to the station's guard and exports the ports.
 
         These are ``MODEL.position``, the effort port, ``MODEL.command_time`` (all of which may
         stay unconnected) and ``MODEL.guard_status``.
 
         Args:
             limits: the limits of the joints.
-            measured: port that says where the joints are.
+            measured: port whose first values say where the joints are.
             effort: name of the effort port ("" for none).
             position: whether positions are commanded at all.
             period: seconds between two commands.
             default_position: where the joints are before the simulation starts.
         """
-        guard = self.builder.AddNamedSystem(
-            f"{self.name}.guard",
-            JointGuard(limits, period=period, default_position=default_position),
+        guard = self._guard()
+        guard.add(
+            self.name,
+            limits,
+            period=period,
+            default_position=default_position,
+            measured_size=measured.size(),
+        )
+        ports = GuardPorts(
+            position=guard.GetOutputPort(f"{self.name}.position"),
+            effort=guard.GetOutputPort(f"{self.name}.effort"),
         )
         if position:
-            self.export_input(guard.GetInputPort("position"), "position")
+            self.export_input(guard.GetInputPort(f"{self.name}.position"), "position")
         if effort:
-            self.export_input(guard.GetInputPort("effort"), effort)
-        self.export_input(guard.GetInputPort("command_time"), "command_time")
-        self.builder.Connect(measured, guard.GetInputPort("position_measured"))
-        self.export_output(guard.GetOutputPort("status"), "guard_status")
+            self.export_input(guard.GetInputPort(f"{self.name}.effort"), effort)
+        self.export_input(guard.GetInputPort(f"{self.name}.command_time"), "command_time")
+        self.builder.Connect(measured, guard.GetInputPort(f"{self.name}.measured"))
+        self.export_output(guard.GetOutputPort(f"{self.name}.status"), "guard_status")
+        return ports
+
+    def _guard(self) -> JointGuard:
+        """The station's one guard, made for the first driver that needs it."""
+        if not self.builder.HasSubsystemNamed("guard"):
+            return self.builder.AddNamedSystem("guard", JointGuard())
+        guard = self.builder.GetSubsystemByName("guard")
+        assert isinstance(guard, JointGuard)
         return guard
 
 
@@ -135,9 +163,9 @@ class Driver:
     Attributes:
         config: type of its configuration: a dataclass with defaults, or one of Drake's structs.
         simulate: adds its systems to a simulated station and exports their ports.
-        connect: does the same over LCM for the real robot; ``{port without MODEL.: gain}`` of
-            the return value tells how its measured ports give the model's positions, see
-            :mod:`prehensile.station.hardware` (None: the driver exists in simulation only).
+        connect: does the same over LCM for the real robot; returns a measured port of m values
+            and the (n, m) matrix that makes the model's n positions of them (None: the driver
+            exists in simulation only).
         prepare: changes the plant before it is finalized, such as the gains of its actuators.
     """
 

@@ -11,10 +11,9 @@ from pydrake.manipulation import (
 )
 from pydrake.systems.framework import OutputPort
 from pydrake.systems.lcm import LcmPublisherSystem, LcmSubscriberSystem
-from pydrake.systems.primitives import Demultiplexer
 
-from prehensile.station.drivers.site import Driver, Site
-from prehensile.station.guard import GuardLimits, JointGuard
+from prehensile.station.drivers.site import Driver, GuardPorts, Site
+from prehensile.station.guard import GuardLimits
 
 _PERIOD = 0.05  # s; the real driver takes no faster commands
 _SPEED = 0.42  # m/s of the opening width (data sheet of the WSG 50)
@@ -53,22 +52,15 @@ def _limits(site: Site) -> GuardLimits:
     )
 
 
-def _add_guard(site: Site, width: OutputPort) -> JointGuard:
+def _add_guard(site: Site, state: OutputPort) -> GuardPorts:
     left, right = site.plant.GetDefaultPositions(site.instance)
     return site.add_guard(
         _limits(site),
-        width,
+        state,
         effort="force_limit",
         period=_PERIOD,
         default_position=np.array([right - left]),
     )
-
-
-def _width(site: Site, state: OutputPort) -> OutputPort:
-    """Splits the width off the pair (width, rate)."""
-    split = site.builder.AddNamedSystem(f"{site.name}.width", Demultiplexer(2))
-    site.builder.Connect(state, split.get_input_port())
-    return split.get_output_port(0)
 
 
 def _simulate(site: Site) -> None:
@@ -93,9 +85,9 @@ def _simulate(site: Site) -> None:
     builder.Connect(
         controller.get_generalized_force_output_port(), plant.get_actuation_input_port(instance)
     )
-    guard = _add_guard(site, _width(site, state.get_output_port()))
-    builder.Connect(guard.GetOutputPort("position"), controller.get_desired_position_input_port())
-    builder.Connect(guard.GetOutputPort("effort"), controller.get_force_limit_input_port())
+    guard = _add_guard(site, state.get_output_port())
+    builder.Connect(guard.position, controller.get_desired_position_input_port())
+    builder.Connect(guard.effort, controller.get_force_limit_input_port())
     site.export_output(state.get_output_port(), "state_measured")
     site.export_output(controller.get_grip_force_output_port(), "force_measured")
 
@@ -115,8 +107,8 @@ def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
         ),
     )
     builder.Connect(subscriber.get_output_port(), receiver.get_status_input_port())
-    width = _width(site, receiver.get_state_output_port())
-    guard = _add_guard(site, width)
+    state = receiver.get_state_output_port()
+    guard = _add_guard(site, state)
     sender = builder.AddNamedSystem(
         f"{name}.command_sender", SchunkWsgCommandSender(default_force_limit=_DEFAULT_FORCE)
     )
@@ -130,12 +122,13 @@ def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
             use_cpp_serializer=True,
         ),
     )
-    builder.Connect(guard.GetOutputPort("position"), sender.get_position_input_port())
-    builder.Connect(guard.GetOutputPort("effort"), sender.get_force_limit_input_port())
+    builder.Connect(guard.position, sender.get_position_input_port())
+    builder.Connect(guard.effort, sender.get_force_limit_input_port())
     builder.Connect(sender.get_command_output_port(), publisher.get_input_port())
-    site.export_output(receiver.get_state_output_port(), "state_measured")
+    site.export_output(state, "state_measured")
     site.export_output(receiver.get_force_output_port(), "force_measured")
-    return width, np.array([[-0.5], [0.5]])
+    # Width and rate to the positions of the two fingers.
+    return state, np.array([[-0.5, 0.0], [0.5, 0.0]])
 
 
 DRIVER = Driver(SchunkWsgDriver, _simulate, _connect)
