@@ -248,6 +248,7 @@ def test_unknown_scenario_names_what_comes_close():
         ("!IiwaDriver", "!IiwDriver", 25, "model_drivers.iiwa", "did you mean '!IiwaDriver'"),
         ("!SchunkWsgDriver {}", "!SchunkWsgDriver", 27, "model_drivers.wsg", "!SchunkWsgDriver {}"),
         ("!SchunkWsgDriver {}", "{}", 27, "model_drivers.wsg", "type of the driver"),
+        ("hand_model_name: wsg", "desired_kp_gains: [1, 2]", 26, None, "2 gains stand where 7"),
         ("hand_model_name: wsg", "hand_model_name: wsh", 26, None, "adds a model 'wsh'"),
         ("model_drivers:", "cameras:", 24, "cameras", "second time"),
         ("name: wsg, file", "name: iiwa, file", 10, None, "model 'iiwa' already"),

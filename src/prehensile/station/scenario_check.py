@@ -311,6 +311,7 @@ def _check_drivers(
             findings.append(
                 driver.finding("the type of the driver is not named", "write NAME: !IiwaDriver {}")
             )
+        _check_gains(name, driver, models, findings)
         hand = driver.get("hand_model_name")
         if hand is not None and hand.text() and hand.value not in models.models:
             findings.append(
@@ -320,6 +321,18 @@ def _check_drivers(
                 )
             )
         _check_bus(driver, buses, findings)
+
+
+def _check_gains(name: str, driver: Node, models: Directives, findings: list[Finding]) -> None:
+    """An arm's stiffness has one element for each joint."""
+    gains, model = driver.get("desired_kp_gains"), models.models.get(name)
+    if gains is None or not isinstance(gains.value, list) or model is None or model.opaque:
+        return
+    positions = [n for n in model.joints.values() if n is None or n > 0]
+    if None not in positions and len(gains.value) != len(positions):
+        findings.append(
+            gains.finding(f"{len(gains.value)} gains stand where {len(positions)} joints move")
+        )
 
 
 def _check_cameras(
