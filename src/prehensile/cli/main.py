@@ -7,6 +7,7 @@ Every subcommand is a module of this package with two functions, ``add_arguments
 
 import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -48,25 +49,44 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the arguments after the program's name; default ``sys.argv[1:]``.
 
     Returns:
-        The exit status: 0 done, 1 done but without success, 2 bad input, 130 interrupted.
+        The exit status: 0 done, 1 done but without success, 2 bad input, 3 a fault of ours (or of
+        a library below us), 130 interrupted, 141 nobody reads the output any more.
     """
     args, rest = _parser().parse_known_args(argv)
-    module_name, text = COMMANDS[args.command]
-    module = importlib.import_module(f"prehensile.cli.{module_name}")
-    parser = argparse.ArgumentParser(prog=f"prehensile {args.command}", description=text)
-    parser.add_argument("--debug", action="store_true", default=args.debug, help=argparse.SUPPRESS)
-    module.add_arguments(parser)
-    command_args = parser.parse_args(rest)
+    # --debug may stand anywhere, after subcommands of a command too.
+    debug = args.debug or "--debug" in rest
     try:
-        return module.run(command_args)
+        return _run(args.command, [argument for argument in rest if argument != "--debug"])
     except InputError as error:
-        if command_args.debug:
+        if debug:
             raise
         for finding in error.findings:
             print(f"prehensile: {finding}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        if command_args.debug:
+        if debug:
             raise
         print("prehensile: interrupted", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        # As in `prehensile models list | head -1`. Python would complain once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except Exception as error:
+        if debug:
+            raise
+        print(
+            f"prehensile: {type(error).__name__}: {error}\n"
+            "prehensile: this is unexpected; the same command with --debug shows where it happened",
+            file=sys.stderr,
+        )
+        return 3
+
+
+def _run(command: str, arguments: Sequence[str]) -> int:
+    module_name, text = COMMANDS[command]
+    module = importlib.import_module(f"prehensile.cli.{module_name}")
+    parser = argparse.ArgumentParser(prog=f"prehensile {command}", description=text)
+    parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
+    module.add_arguments(parser)
+    return module.run(parser.parse_args(arguments))
