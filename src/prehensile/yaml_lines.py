@@ -148,6 +148,15 @@ def merge(base: Node, over: Node) -> Node:
     return over
 
 
+def children(node: Node | None) -> dict[str, Node]:
+    """The entries of a map node; empty if it is none.
+
+    Args:
+        node: any node.
+    """
+    return node.value if node is not None and isinstance(node.value, dict) else {}
+
+
 def close_to(name: str, known: Iterable[str], otherwise: str = "") -> str:
     """Says in words which of the known names may have been meant.
 

@@ -5,22 +5,25 @@ a mesh resolution that takes all memory). This finds all faults at once, with th
 tells the names of links, frames and joints, so that a scenario's references can be checked.
 """
 
-import json
-import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from prehensile.errors import Finding, InputError
+from prehensile.models.model_values import (
+    Fault,
+    collision_faults,
+    gltf_faults,
+    greatest_extent,
+    inertial_faults,
+    limit_faults,
+    number_faults,
+    resolution_hint,
+)
 from prehensile.models.packages import inside, resolve
 from prehensile.models.xml_lines import Element, read_xml
 
 MAX_MESH_BYTES = 512 << 20
-MAX_RESOLUTION = 100
-"""Greatest ratio of a shape's size to its ``mesh_resolution_hint``: finer meshes take gigabytes."""
-
-_POSITIVE = ("drake:hydroelastic_modulus", "drake:point_contact_stiffness")
-_NOT_NEGATIVE = ("drake:mu_static", "drake:mu_dynamic", "mu", "mu2", "drake:relaxation_time")
 _MAX_INCLUDES = 20  # nested SDF files
 _SDF_DOF = {
     "revolute": 1,
@@ -39,13 +42,11 @@ class Shape:
     """A collision shape whose hydroelastic mesh depends on a resolution hint.
 
     Attributes:
-        line: its line in the file.
-        where: its link and name, for messages.
+        where: its link, for messages.
         size: its greatest extent in metres.
         hint: its own resolution hint in metres, None if the scenario's default applies.
     """
 
-    line: int
     where: str
     size: float
     hint: float | None
@@ -140,7 +141,7 @@ class _FileChecker:
             self._add(root, f"the outermost element is <{root.tag}>, not <{wanted}>")
             return
         for element in root.walk():
-            self._check_numbers(element)
+            self._report(number_faults(element))
         if sdf:
             models = root.all("model")
             if len(models) != 1 or root.child("world"):
@@ -172,7 +173,7 @@ class _FileChecker:
                 limit = axis.child("limit")
                 if limit is not None:
                     values = {c.tag: c.text for c in limit.children}
-                    self._check_limits(limit, joint.name, values)
+                    self._report(limit_faults(limit, joint.name, values))
         for joint in model.children:
             if joint.tag == "drake:joint":
                 self._model.joints[scope + joint.name] = None
@@ -224,7 +225,7 @@ class _FileChecker:
             self._add(root, f"the outermost element is <{root.tag}>, not <mujoco>")
             return
         for element in root.walk():
-            self._check_numbers(element)
+            self._report(number_faults(element))
             if element.tag == "include":
                 path, folder = self._resolve(element, element.attributes.get("file", ""))
                 if path and folder and self._may_include(element, path):
@@ -246,7 +247,7 @@ class _FileChecker:
             self._model.frames |= {joint.name + end for end in ("_parent", "_child")}
             limit = joint.child("limit")
             if limit is not None:
-                self._check_limits(limit, joint.name, limit.attributes)
+                self._report(limit_faults(limit, joint.name, limit.attributes))
 
     # Both
 
@@ -254,97 +255,18 @@ class _FileChecker:
         self._model.frames.add(name)
         inertial = link.child("inertial")
         if inertial is not None:
-            mass = inertial.child("mass")
-            if mass is not None:
-                self._check_mass(mass, name)
-            inertia = inertial.child("inertia")
-            if inertia is not None:
-                values = inertia.attributes | {c.tag: c.text for c in inertia.children}
-                for axis in ("ixx", "iyy", "izz"):
-                    value = _number(values.get(axis, ""))
-                    if value is not None and not (0 <= value < math.inf):
-                        self._add(inertia, f"{axis} of link '{name}' is {value:g}", _INERTIA_MEND)
+            self._report(inertial_faults(inertial, name))
         for geometry in (*link.all("visual"), *link.all("collision")):
             shape = geometry.child("geometry")
             for mesh in shape.walk() if shape else ():
                 if mesh.tag == "mesh":
                     self._check_mesh(mesh)
             if shape is not None and geometry.tag == "collision":
-                self._check_collision(geometry, shape, name)
-
-    def _check_mass(self, mass: Element, link: str) -> None:
-        text = mass.attributes.get("value", mass.text)
-        value = _number(text)
-        if value is None:
-            self._add(mass, f"the mass of link '{link}' is not a number: '{text}'")
-        elif not 0 <= value < math.inf and not math.isnan(value):  # NaN is reported elsewhere
-            self._add(mass, f"the mass of link '{link}' is {value:g} kg", "a mass is at least 0")
-
-    def _check_collision(self, collision: Element, geometry: Element, link: str) -> None:
-        for shape in geometry.children:
-            self._check_size(shape, link)
-        size = _greatest_extent(geometry)
-        hint: float | None = None
-        for element in collision.walk():
-            value = _number(element.attributes.get("value", element.text))
-            if value is None:
-                continue
-            if element.tag == "drake:mesh_resolution_hint":
-                hint = value
-                self._check_resolution(element, value, size, link)
-            elif element.tag in _POSITIVE and value <= 0:
-                self._add(element, f"<{element.tag}> is {value:g}", "it must be > 0")
-            elif element.tag in _NOT_NEGATIVE and value < 0:
-                self._add(element, f"<{element.tag}> is {value:g}", "it must be at least 0")
-        if size is not None:
-            where = f"link '{link}'"
-            self._model.shapes.append(Shape(collision.line, where, size, hint))
-
-    def _check_size(self, shape: Element, link: str) -> None:
-        values = shape.attributes | {c.tag: c.text for c in shape.children}
-        for key in ("size", "radius", "length", "radii", "drake:radius", "drake:length"):
-            for value in (_number(token) for token in values.get(key, "").split()):
-                if value is not None and (value <= 0 or math.isinf(value)):
-                    self._add(
-                        shape,
-                        f"the {key} of a {shape.tag} on link '{link}' is {value:g}",
-                        "sizes are finite and > 0",
-                    )
-
-    def _check_resolution(
-        self, element: Element, hint: float, size: float | None, link: str
-    ) -> None:
-        if math.isinf(hint) or hint <= 0:
-            self._add(element, f"the mesh resolution hint is {hint:g} m", "it must be > 0")
-        elif size is not None and size / hint > MAX_RESOLUTION:
-            self._add(
-                element,
-                f"a mesh resolution of {hint:g} m is absurd for a shape of {size:g} m "
-                f"on link '{link}'",
-                f"use {size / MAX_RESOLUTION:g} m or more",
-            )
-
-    def _check_limits(self, limit: Element, joint: str, values: Mapping[str, str]) -> None:
-        lower, upper = _number(values.get("lower", "")), _number(values.get("upper", ""))
-        if lower is not None and upper is not None and lower > upper:
-            self._add(
-                limit,
-                f"the limits of joint '{joint}' are the wrong way round: {lower:g} > {upper:g}",
-                "write the lower one first",
-            )
-
-    def _check_numbers(self, element: Element) -> None:
-        """NaN is wrong wherever it stands."""
-        texts = [*element.attributes.items(), ("", "" if element.children else element.text)]
-        for key, text in texts:
-            if key in ("name", "filename", "link", "file"):
-                continue
-            tokens = text.lower().split()
-            if any(token in ("nan", "-nan", "+nan") for token in tokens) and all(
-                _number(token) is not None for token in tokens
-            ):
-                where = f"{element.tag}.{key}" if key else element.tag
-                self._add(element, f"<{where}> is NaN (not a number)", "write a number")
+                self._report(collision_faults(geometry, name))
+                size = greatest_extent(shape)
+                if size is not None:
+                    hint = resolution_hint(geometry)
+                    self._model.shapes.append(Shape(f"link '{name}'", size, hint))
 
     def _check_mesh(self, mesh: Element) -> None:
         uri = mesh.child("uri")
@@ -360,7 +282,7 @@ class _FileChecker:
         if size > MAX_MESH_BYTES:
             self._add(element, f"the mesh '{text}' has {size >> 20} MiB", "simplify it")
         elif path.suffix == ".gltf":
-            for fault in _gltf_faults(path, root):
+            for fault in gltf_faults(path, root):
                 self._add(element, f"the mesh '{text}': {fault}")
 
     def _resolve(
@@ -394,58 +316,12 @@ class _FileChecker:
         files = config.all("sdf") if config else []
         return f"{url}/{files[-1].text}" if files else url
 
+    def _report(self, faults: Iterable[Fault]) -> None:
+        for fault in faults:
+            self._add(fault.element, fault.message, fault.mend)
+
     def _add(self, element: Element, message: str, mend: str = "") -> None:
         if message in self._said and "package" in message:
             return  # once a file is enough
         self._said.add(message)
         self._findings.append(Finding(message, mend, str(self._model.path), element.line))
-
-
-_INERTIA_MEND = "a moment of inertia is at least 0"
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _greatest_extent(geometry: Element) -> float | None:
-    """Greatest extent of a sphere, cylinder, capsule or ellipsoid; None for other shapes.
-
-    Only these are meshed by the resolution hint.
-    """
-    for shape in geometry.children:
-        kind = shape.tag.removeprefix("drake:")
-        if kind not in ("sphere", "cylinder", "capsule", "ellipsoid"):
-            continue
-        values = shape.attributes | {c.tag: c.text for c in shape.children}
-        numbers = [
-            _number(token)
-            for key in ("radius", "length", "radii", "a", "b", "c")
-            for token in values.get(key, "").split()
-        ]
-        found = [n for n in numbers if n is not None and math.isfinite(n)]
-        if found:
-            return 2 * max(found)
-    return None
-
-
-def _gltf_faults(path: Path, root: Path) -> list[str]:
-    """Files that a .gltf refers to and that are not there."""
-    try:
-        gltf = json.loads(path.read_bytes())
-        uris = [
-            item.get("uri", "data:") for key in ("buffers", "images") for item in gltf.get(key, [])
-        ]
-    except (ValueError, AttributeError, TypeError, RecursionError) as error:
-        return [f"not valid glTF: {error}"]
-    faults = []
-    for uri in uris:
-        if not str(uri).startswith("data:"):
-            try:
-                inside(root, path.parent / str(uri), str(uri))
-            except InputError as error:
-                faults.append(error.findings[0].message)
-    return faults
