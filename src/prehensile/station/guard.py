@@ -247,7 +247,12 @@ def guard_step(
             v_min = max(v_min, -brake_speed(q - lower, a, period))
         c = min(max(target, lower), upper)
         v_next = (c - q) / period if follow else 0.0
-        if follow and v_min <= v_next <= v_max:
+        v_command = min(max((c - last) / period, -top_speed), top_speed)
+        if (
+            follow
+            and v_min <= v_next <= v_max
+            and abs(v_next - v_command) <= a * period + slack  # else it would overshoot
+        ):
             q_next = c
             limited = limited or c != target
         else:
@@ -255,7 +260,6 @@ def guard_step(
                 limited = True
                 # Approach the command in the frame that moves with it: braking there ends
                 # beside it, at its speed.
-                v_command = min(max((c - last) / period, -top_speed), top_speed)
                 lag = c - q - v_command * period
                 v_next = v_command + math.copysign(brake_speed(abs(lag), a, period), lag)
             v_next = min(max(v_next, v_min), v_max)
@@ -303,6 +307,7 @@ class _Group:
     efforts: int
     status: int
     memory: int
+    rest: bytes
 
 
 _SETTLED, _WAITING = 1.0, 2.0
@@ -370,6 +375,7 @@ class JointGuard(LeafSystem):
             efforts=int(effort),
             status=int(status),
             memory=int(memory),
+            rest=np.array([0.0] * n + [_SETTLED]).tobytes(),
         )
         self.DeclareInitializationDiscreteUpdateEvent(partial(_initialize, group))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, partial(_update, group))
@@ -395,13 +401,13 @@ def _update(group: _Group, context: Context, values: DiscreteValues) -> None:
     stamp = group.time.Eval(context)[0] if group.time.HasValue(context) else None
     fresh = stamp is None or context.get_time() - stamp <= group.timeout
     memory = values.value(group.memory)
-    n = group.limits.size
     if fresh and not has_effort:
         if command is None:
             if memory[-1] == _WAITING:
                 return
-        elif memory[-1] == _SETTLED and command.tobytes() == memory[:n].tobytes():
+        elif command.tobytes() + group.rest == memory.tobytes():
             return
+    n = group.limits.size
     state = GuardState(
         position=values.value(group.positions).tolist(),
         velocity=memory[n : 2 * n].tolist(),
