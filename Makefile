@@ -27,7 +27,7 @@ bench: .venv/.installed  ## our speed beside the peers', each in a virtual envir
 	$(RUN)/prehensile bench
 
 docs: .venv/.docs  ## the documentation as web pages, in site/
-	$(RUN)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --strict --quiet
 
 lint: .venv/.dev  ## ruff, pyright, clang-format
 	$(RUN)/ruff check
