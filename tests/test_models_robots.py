@@ -5,17 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.geometry import Role
+from pydrake.geometry import (
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Box,
+    ProximityProperties,
+    Role,
+)
 from pydrake.manipulation import SchunkWsgPositionController
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
     AddMultibodyPlantSceneGraph,
+    CoulombFriction,
     MultibodyPlant,
     MultibodyPlantConfig,
 )
-from pydrake.multibody.tree import RevoluteJoint
+from pydrake.multibody.tree import RevoluteJoint, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -301,6 +308,90 @@ def test_gripper_opening_is_the_distance_between_the_pads() -> None:
     hits = query.ComputeSignedDistanceToPoint(body @ np.array([0.005, 0.102, 0.0]))
     distances = [hit.distance for hit in hits if hit.id_G in pads]
     np.testing.assert_allclose(distances, 0.025, atol=1e-6)
+
+
+def test_gripper_holds_a_brick_by_its_rubber_pads() -> None:
+    # The brick floats between the pads; they press on it with 15 N; then its weight sets in.
+    mass, force = 0.4, 15.0
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(
+        time_step=0.004,
+        contact_model="hydroelastic_with_fallback",
+        discrete_contact_approximation="sap",
+    )
+    plant, _ = AddMultibodyPlant(config, builder)
+    parser = Parser(plant)
+    parser.package_map().AddMap(package_map())
+    (hand,) = parser.AddModelsFromUrl(find_model("wsg50").url)
+    # Fingers down, the middle of the pads at the world's origin.
+    X_WPads = RigidTransform(RollPitchYaw(-np.pi / 2, 0.0, 0.0), [0.0, 0.0, 0.0])
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("grasp_frame"), X_WPads)
+    instance = plant.AddModelInstance("brick")
+    size = (0.05, 0.075, 0.05)
+    brick = plant.AddRigidBody("brick", instance, SpatialInertia.SolidBoxWithMass(mass, *size))
+    properties = ProximityProperties()
+    AddRigidHydroelasticProperties(0.05, properties)
+    AddContactMaterial(friction=CoulombFriction(0.6, 0.6), properties=properties)
+    plant.RegisterCollisionGeometry(brick, RigidTransform(), Box(*size), "brick", properties)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetPositions(context, hand, [-0.02495, 0.02495])  # in touch, so that nothing is hit
+    plant.get_actuation_input_port(hand).FixValue(context, [force, -force])
+    weight = np.zeros(plant.num_velocities())
+    weights = plant.get_applied_generalized_force_input_port()
+    weights.FixValue(context, weight)
+    simulator.AdvanceTo(0.4)
+    X_WB = plant.EvalBodyPoseInWorld(context, brick)
+    weight[-1] = -9.81 * mass
+    weights.FixValue(context, weight)
+    simulator.AdvanceTo(1.4)
+    moved = X_WB.InvertAndCompose(plant.EvalBodyPoseInWorld(context, brick))
+    assert np.linalg.norm(moved.translation()) < 5e-4
+    assert moved.rotation().ToAngleAxis().angle() < np.radians(0.5)
+    results = plant.get_contact_results_output_port().Eval(context)
+    assert results.num_hydroelastic_contacts() == 2
+    # Each pad presses with what its finger is driven by, over a patch that stays cheap.
+    for i in range(2):
+        info = results.hydroelastic_contact_info(i)
+        normal = abs(info.F_Ac_W().translational()[0])
+        assert normal == pytest.approx(force, rel=0.03)
+        assert info.contact_surface().num_faces() <= 16
+    # The opening is the width of the brick, less what the rubber gives.
+    q = plant.GetPositions(context, hand)
+    assert q[1] - q[0] == pytest.approx(0.05, abs=6e-4)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_arm_with_hand_rests_on_the_table_under_gravity_compensation(arm: str) -> None:
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(
+        time_step=0.002,
+        contact_model="hydroelastic_with_fallback",
+        discrete_contact_approximation="sap",
+    )
+    plant, _ = AddMultibodyPlant(config, builder)
+    parser = Parser(plant)
+    parser.package_map().AddMap(package_map())
+    (instance,) = parser.AddModelsFromUrl(find_model(arm).url)
+    (hand,) = parser.AddModelsFromUrl(find_model("wsg50").url)
+    (table,) = parser.AddModelsFromUrl(find_model("table").url)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
+    plant.WeldFrames(plant.GetFrameByName("iiwa_link_7"), plant.GetFrameByName("body"), X_7G)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link", table))
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    q = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
+    plant.SetPositions(context, instance, q)
+    assert not _bodies_in_contact(plant, context)
+    holding = -plant.CalcGravityGeneralizedForces(context)
+    plant.get_actuation_input_port(instance).FixValue(context, holding[:7])
+    plant.get_actuation_input_port(hand).FixValue(context, holding[7:])
+    simulator.AdvanceTo(1.0)
+    np.testing.assert_allclose(plant.GetPositions(context, instance), q, atol=1e-4)
+    assert np.abs(plant.GetVelocities(context)).max() < 1e-3
 
 
 @needs_drake_models
