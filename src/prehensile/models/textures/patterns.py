@@ -38,6 +38,6 @@ def grain(
         bend += 0.12 / k * np.sin(2 * np.pi * (k * y * (0.4 + 0.4 * a) + b) + 2.0 * c * x)
     phase = rings * np.sqrt((0.35 + np.abs(x + bend - 0.15)) ** 2 + 0.15 * y**2)
     late = (phase % 1.0) ** 3
-    fibre = 0.12 * (rng.random((1, columns)) - 0.5) + 0.05 * (rng.random((rows, columns)) - 0.5)
+    fibre = 0.12 * (rng.random((1, columns)) - 0.5)
     share = np.clip(late + fibre, 0.0, 1.0)[:, :, None]
     return np.array(light) * (1.0 - share) + np.array(dark) * share

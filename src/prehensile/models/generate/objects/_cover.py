@@ -6,40 +6,64 @@ import numpy as np
 
 from prehensile.models.generate.sdf_model import Collision
 
-_SAMPLES = 3000  # points by which the volume is known
-_STICK_OUT = (0.005, 0.012)  # m, how far a sphere may reach out of the geometry
+_SAMPLES = 1500  # points, roughly, by which the volume is known
+_STICK_OUT = (0.005, 0.014)  # m, how far a sphere may reach out of the geometry
+_LOOK_OUT = 0.0025  # m, how far the geometry may reach out of the spheres
 
 
 def cover(collisions: Sequence[Collision]) -> np.ndarray:
-    """Spheres (K, 4), rows x, y, z, radius, whose union contains the collision geometry.
+    """Spheres (K, 4), rows x, y, z, radius, whose union contains the geometry but for 2.5 mm.
 
-    Greedy set cover: candidates are the points of a lattice in the geometry, each with the radius
-    that sticks out by what is allowed (a quarter of the thickness, 5 to 12 mm).
+    Greedy set cover: candidates are sample points of the geometry, each with the radius that
+    sticks out by what is allowed (a quarter of the thickness, 5 to 14 mm).
     """
-    lower, upper = _bounds(collisions)
-    extent = upper - lower
+    placed = [(_placement(c), c) for c in collisions]
+    corners = np.concatenate([_samples(c, 1.0) @ R.T + p for (R, p), c in placed])
+    extent = np.ptp(corners, axis=0)
     stick_out = float(np.clip(0.25 * extent.min(), *_STICK_OUT))
-    spacing = (np.prod(extent) / _SAMPLES) ** (1.0 / 3.0)
-    axes = [
-        np.linspace(lo, hi, max(5, round((hi - lo) / spacing) + 1))
-        for lo, hi in zip(lower, upper, strict=True)
-    ]
-    lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    depth = -signed_distance(collisions, lattice)
-    points, depth = lattice[depth >= -1e-9], depth[depth >= -1e-9]
-    radii = np.round(depth + stick_out, 5)
-    # Space between the points of the lattice must be covered too.
-    reach = radii - 0.3 * max(axis[1] - axis[0] for axis in axes)
+    spacing = float(np.prod(extent) / _SAMPLES) ** (1.0 / 3.0)
+    points = np.concatenate([_samples(c, spacing) @ R.T + p for (R, p), c in placed])
+    radii = np.round(stick_out - signed_distance(collisions, points), 5)
+    # The space between the samples must be covered too; a corner may look out a little.
+    reach = radii - 0.3 * spacing + _LOOK_OUT
     norms = (points**2).sum(axis=1)
     squares = norms[:, None] + norms - 2.0 * points @ points.T
     covers = squares <= np.maximum(reach, 1e-4)[:, None] ** 2
+    gains = covers.sum(axis=1)
     chosen = []
     open_points = np.ones(len(points), dtype=bool)
     while open_points.any():
-        best = int(np.argmax(covers @ open_points.astype(np.float32)))
+        best = int(np.argmax(gains))
         chosen.append(best)
-        open_points &= ~covers[best]
+        newly = covers[best] & open_points
+        gains -= covers[:, newly].sum(axis=1)
+        open_points &= ~newly
     return np.column_stack([points[chosen], radii[chosen]])
+
+
+def _samples(collision: Collision, spacing: float) -> np.ndarray:
+    """Points (N, 3) in and on a shape, in its own frame, about ``spacing`` m apart."""
+
+    def steps(length: float) -> int:
+        return max(1, round(length / spacing))
+
+    kind, size = collision.shape.kind, collision.shape.size
+    if kind == "box":
+        axes = [np.linspace(-s / 2.0, s / 2.0, steps(s) + 1) for s in size]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    # The others are bodies of revolution about z.
+    radius = size[0]
+    straight = size[1] / 2.0 if len(size) > 1 else 0.0
+    cap = 0.0 if kind == "cylinder" else radius
+    points = []
+    for z in np.linspace(-straight - cap, straight + cap, max(2, steps(2 * (straight + cap))) + 1):
+        over = max(0.0, abs(z) - straight)
+        wide = float(np.sqrt(max(0.0, radius**2 - over**2)))
+        for r in np.linspace(0.0, wide, steps(wide) + 1):
+            turn = np.linspace(0.0, 2.0 * np.pi, max(6, steps(2.0 * np.pi * r)), endpoint=False)
+            ring = [r * np.cos(turn), r * np.sin(turn), np.full(len(turn), z)]
+            points.append(np.column_stack(ring) if r > 0.0 else np.array([[0.0, 0.0, z]]))
+    return np.concatenate(points)
 
 
 def signed_distance(collisions: Sequence[Collision], points: np.ndarray) -> np.ndarray:
@@ -81,24 +105,3 @@ def _placement(collision: Collision) -> tuple[np.ndarray, np.ndarray]:
         ]
     )
     return rotation, np.array([x, y, z])
-
-
-def _bounds(collisions: Sequence[Collision]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a box that contains all shapes."""
-    lows, highs = [], []
-    for collision in collisions:
-        rotation, position = _placement(collision)
-        kind, size = collision.shape.kind, collision.shape.size
-        if kind == "box":
-            half = np.abs(rotation) @ (np.asarray(size) / 2.0)
-        elif kind == "sphere":
-            half = np.full(3, size[0])
-        else:
-            axis = np.abs(rotation[:, 2])
-            if kind == "capsule":
-                half = size[0] + axis * size[1] / 2.0
-            else:
-                half = size[0] * np.sqrt(np.maximum(1.0 - axis**2, 0.0)) + axis * size[1] / 2.0
-        lows.append(position - half)
-        highs.append(position + half)
-    return np.min(lows, axis=0), np.max(highs, axis=0)

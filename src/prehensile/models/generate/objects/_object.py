@@ -19,12 +19,14 @@ from prehensile.models.generate.sdf_model import (
 )
 from prehensile.models.shapes import Mesh, Part, write_gltf
 
-YCB = (
+_TABLE = (
     "B. Calli, A. Walsman, A. Singh, S. Srinivasa, P. Abbeel, A. Dollar: Benchmarking in "
     "Manipulation Research: The YCB Object and Model Set and Benchmarking Protocols, IEEE "
-    "Robotics and Automation Magazine 22(3), 2015, table of the objects",
+    "Robotics and Automation Magazine 22(3), 2015, table of the objects"
+)
+_SCANS = (
     "B. Calli et al.: Yale-CMU-Berkeley dataset for robotic manipulation research, "
-    "International Journal of Robotics Research 36(3), 2017",
+    "International Journal of Robotics Research 36(3), 2017, three-dimensional scans"
 )
 
 
@@ -36,6 +38,8 @@ class HouseholdObject:
         title: for people.
         description: one or two sentences.
         number: of the object in the YCB set, such as "003_cracker_box".
+        scanned: whether the dimensions are the bounding box of the set's scan, for objects where
+            that differs from the printed table by more than a few millimetres.
         mass: kg.
         parts: what is seen.
         body: closed mesh whose even filling gives centre of mass and inertia.
@@ -49,6 +53,7 @@ class HouseholdObject:
     parts: Sequence[Part]
     body: Mesh
     collisions: Sequence[Collision]
+    scanned: bool = False
 
 
 def write_object(folder: Path, thing: HouseholdObject) -> None:
@@ -72,6 +77,10 @@ def write_object(folder: Path, thing: HouseholdObject) -> None:
         title=thing.title,
         category="object",
         description=thing.description,
-        sources=[f"{source} ({thing.number})" for source in YCB],
+        sources=[
+            f"mass: {_TABLE} ({thing.number})",
+            f"dimensions: {_SCANS if thing.scanned else _TABLE} ({thing.number})",
+            "shape and print: our own",
+        ],
     )
     write_spheres(folder, {"base_link": cover(thing.collisions)})

@@ -10,7 +10,7 @@ from prehensile.models.generate.sdf_model import Collision
 from prehensile.models.shapes import Material, Mesh, Part, sweep
 from prehensile.models.textures import Panel
 
-RADIUS, BEND = 0.018, 0.105  # of the section at the middle, of the curve, m
+RADIUS, BEND = 0.018, 0.110  # of the section at the middle, of the curve, m
 HALF_ANGLE = np.radians(55.0)
 BALL_ANGLES = np.radians([-49.0, -38.0, -24.0, -8.0, 8.0, 24.0, 38.0, 49.0])
 

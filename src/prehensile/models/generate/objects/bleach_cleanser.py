@@ -71,7 +71,7 @@ def _cap() -> list[Mesh]:
 
 def _collisions() -> list[Collision]:
     gap, base = 2.0 * INSET, -0.5 * HEIGHT
-    waist, top = 0.118 + base, SHOULDER + 0.012 + base
+    waist, top = 0.118 + base, SHOULDER + 0.003 + base
     flat_a, flat_b = 0.74 * A, 0.7 * B
     low, tall = 0.5 * (base + waist), waist - base
     upper, rise = 0.5 * (waist + top), top - waist

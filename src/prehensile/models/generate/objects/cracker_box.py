@@ -69,5 +69,6 @@ def generate(folder: Path) -> None:
             parts=[part],
             body=part.mesh,
             collisions=box_collisions(SIZE),
+            scanned=True,
         ),
     )

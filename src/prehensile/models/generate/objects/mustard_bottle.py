@@ -56,7 +56,7 @@ def _cap() -> Mesh:
 
 def _collisions() -> list[Collision]:
     gap, base = 2.0 * INSET, -0.5 * HEIGHT
-    top = SHOULDER + 0.006 + base
+    top = SHOULDER + base
     flat_a, flat_b = 0.72 * A, 0.66 * B  # where the octagon meets the rounded wall
     middle, tall = 0.5 * (top + base), top - base
     cap_low, cap_high = top, 0.169 + base
@@ -111,5 +111,6 @@ def generate(folder: Path) -> None:
             parts=[Part(body, printed), Part(cap, red)],
             body=body,
             collisions=_collisions(),
+            scanned=True,
         ),
     )

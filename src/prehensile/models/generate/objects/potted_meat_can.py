@@ -90,5 +90,6 @@ def generate(folder: Path) -> None:
             parts=_parts(paper),
             body=body,
             collisions=_collisions(),
+            scanned=True,
         ),
     )

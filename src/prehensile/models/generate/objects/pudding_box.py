@@ -8,7 +8,7 @@ from prehensile.models.generate.objects._boxes import blank_faces, printed_box
 from prehensile.models.generate.objects._contact import box_collisions
 from prehensile.models.generate.objects._object import HouseholdObject, write_object
 
-SIZE = (0.038, 0.110, 0.089)
+SIZE = (0.035, 0.110, 0.089)
 BROWN, CREAM, DARK, GOLD = "#5a2f16", "#f7e3bd", "#36190a", "#e0a030"
 
 

@@ -52,5 +52,6 @@ def generate(folder: Path) -> None:
             parts=tin(RADIUS, HEIGHT, paper),
             body=cylinder(RADIUS, HEIGHT),
             collisions=can_collisions(RADIUS, HEIGHT),
+            scanned=True,
         ),
     )
