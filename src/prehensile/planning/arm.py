@@ -17,6 +17,7 @@ from pydrake.planning import (
 )
 
 from prehensile.errors import InputError
+from prehensile.planning.obstacles import HeightMap, body_points, shape_points
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class JointLimits:
 class ArmModel:
     """An arm with a hand among the fixed things around it, for planning.
 
-    Free objects are not part of it: what a camera sees is added with :meth:`set_obstacles`, and
+    Free objects are not part of it: what the cameras see is added with :meth:`set_heights`, and
     a grasped object with :meth:`attach`. Configurations q are those of the arm's joints alone,
     (n,); the hand stands at the width of :meth:`set_hand_width`.
 
@@ -108,6 +109,8 @@ class ArmModel:
         self._fingers = [joint for joint in hand_joints if joint.num_positions() == 1]
         self._hand_bodies = plant.GetBodyIndices(hand_instance)
 
+        wrist = joints[max(0, len(joints) - 3)]
+        self._points = body_points(diagram, plant.GetBodiesKinematicallyAffectedBy([wrist.index()]))
         weights = np.full(plant.num_positions(), 1.0)
         weights[self._index] = _lever_arms(plant, self._index, arm_instance, hand_instance)
         self.checker = SceneGraphCollisionChecker(
@@ -129,6 +132,8 @@ class ArmModel:
         self._context = self.plant.CreateDefaultContext()
         self._q = self.plant.GetPositions(self._context)
         self._padding = padding
+        self._held_points: np.ndarray | None = None
+        self._heights: HeightMap | None = None
         self.set_hand_width(np.inf)
 
     @property
@@ -181,28 +186,50 @@ class ArmModel:
         self.checker.SetPaddingAllRobotEnvironmentPairs(padding)
 
     def set_obstacles(self, shapes: Sequence[tuple[Shape, RigidTransform]]) -> None:
-        """Replaces the added fixed obstacles by the given shapes and their poses X_WS."""
+        """Replaces the added fixed obstacles by the given shapes and their poses X_WS.
+
+        Meant for a few: the time it takes grows with the cube of their number.
+        """
         self.checker.RemoveAllAddedCollisionShapes("obstacles")
         world = self.plant.world_body()
         for shape, X_WS in shapes:
             self.checker.AddCollisionShapeToBody("obstacles", world, shape, X_WS)
 
+    @property
+    def heights(self) -> HeightMap | None:
+        """What the hand, the wrist and what is held have to stay above."""
+        return self._heights
+
+    def set_heights(self, heights: HeightMap | None) -> None:
+        """Keeps hand, wrist and what is held above the heights from now on (None: free)."""
+        self._heights = heights
+
     def attach(self, shape: Shape, X_GS: RigidTransform) -> None:
         """Holds the shape in the hand, at X_GS, in place of anything held before."""
         self.detach()
         self.checker.AddCollisionShapeToFrame("held", self.frame_G, shape, X_GS)
+        self._held_points = shape_points(shape, X_GS)
 
     def detach(self) -> None:
         """Holds nothing in the hand any more."""
         self.checker.RemoveAllAddedCollisionShapes("held")
+        self._held_points = None
 
     def is_free(self, q: np.ndarray) -> bool:
         """Whether the arm at q, (n,), touches neither itself nor its surroundings."""
-        return self.checker.CheckConfigCollisionFree(self.full(q))
+        return self.checker.CheckConfigCollisionFree(self.full(q)) and not self._too_low(q)
 
     def edge_is_free(self, q_A: np.ndarray, q_B: np.ndarray) -> bool:
         """Whether the straight line in joint space is free, checked every ``edge_step``."""
-        return self.checker.CheckEdgeCollisionFree(self.full(q_A), self.full(q_B))
+        if not self.checker.CheckEdgeCollisionFree(self.full(q_A), self.full(q_B)):
+            return False
+        if self._heights is None:
+            return True
+        length = float(np.linalg.norm((q_B - q_A) * self.weights))
+        count = int(np.ceil(length / self.checker.edge_step_size())) + 1
+        return not any(
+            self._too_low((1.0 - u) * q_A + u * q_B) for u in np.linspace(0.0, 1.0, count)
+        )
 
     def path_is_free(self, path: np.ndarray) -> bool:
         """Whether all edges of the path, (K, n), are free."""
@@ -228,7 +255,20 @@ class ArmModel:
         pairs = sorted(
             {f"{self._body(a)} and {self._body(b)}" for a, b, distance in rows if distance < 0.0}
         )
+        if self._too_low(q):
+            pairs.append("the hand and what was seen")
         return ", ".join(pairs)
+
+    def _too_low(self, q: np.ndarray) -> bool:
+        """Whether the hand, the wrist or what is held is below the heights."""
+        if self._heights is None:
+            return False
+        X_WG = self.pose(q)
+        clouds = [] if self._held_points is None else [X_WG.multiply(self._held_points.T).T]
+        for index, p_BP in self._points:
+            X_WB = self.plant.EvalBodyPoseInWorld(self._context, self.plant.get_body(index))
+            clouds.append(X_WB.multiply(p_BP.T).T)
+        return self._heights.lowers(np.vstack(clouds))
 
     def _body(self, index) -> str:
         body = self.plant.get_body(index)

@@ -1,8 +1,8 @@
 """Plans of whole moves of an arm with a hand: to a grasp and up, to a drop and away, and home."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.geometry import Shape
@@ -28,10 +28,12 @@ class MoveOptions:
         carry_speed: the same with an object in the hand, in (0, 1].
         acceleration: factor on the joint acceleration limits, in (0, 1].
         carry_acceleration: the same with an object in the hand, in (0, 1].
-        near_padding: clearance from the surroundings on straight lines near objects (m); free
-            motions keep the arm model's own clearance where their ends allow it.
+        near_padding: clearance from the surroundings on straight lines near objects (m), checked
+            three times as finely; free motions keep the arm model's own clearance where their
+            ends allow it.
         deviation: how far free motions may pass from their corners (rad).
         starts: starts of inverse kinematics per pose (>= 1).
+        samples: samples of a path search before it gives up (>= 1).
         max_poses: grasps or drops tried before giving up (>= 1).
     """
 
@@ -43,6 +45,7 @@ class MoveOptions:
     near_padding: float = 0.001
     deviation: float = 0.05
     starts: int = 5
+    samples: int = 300
     max_poses: int = 20
 
 
@@ -159,7 +162,9 @@ def plan_pick(
 
     The hand goes to the pre-grasp pose, `pregrasp_distance` behind the grasp along its approach
     axis y_G, moves in on a straight line, and afterwards straight up in the world. Both ways to
-    hold the hand (fingers exchanged) are considered, nearer configurations first.
+    hold the hand (fingers exchanged) are considered, nearer configurations first. Where the arm
+    model has heights, the hand stays above them up to the pre-grasp pose, and backs off up to
+    three times as far if that lies below them; the straight lines may go through.
 
     Args:
         arm: the arm and its surroundings.
@@ -183,17 +188,18 @@ def plan_pick(
             X_WG = arm.pose(q_grasp)
             X_WGpre = X_WG @ RigidTransform([0.0, -pregrasp_distance, 0.0])
             X_WGlift = RigidTransform([0.0, 0.0, lift_height]) @ X_WG
-            with _padding(arm, options.near_padding):
+            with _near(arm, options):
                 back = plan_cartesian(arm, q_grasp, X_WGpre)
                 up = plan_cartesian(arm, q_grasp, X_WGlift) if back.found else back
             if not up.found:
                 reason = ("approach: " if not back.found else "lift: ") + up.reason
                 continue
-            path, reason = _free_path(arm, q_start, back.path[-1], rng, options)
+            line = _back_off(arm, back.path, pregrasp_distance, options)
+            path, reason = _free_path(arm, q_start, line[-1], rng, options)
             if path is None:
                 continue
             approach, reason = _timed(
-                arm, [path, back.path[::-1]], [options.speed, options.near_speed], None, options
+                arm, [path, line[::-1]], [options.speed, options.near_speed], None, options
             )
             lift = time_parameterize(
                 up.path,
@@ -241,7 +247,7 @@ def plan_place(
                 up = np.array([q_drop])
                 if approach_height > 0.0:
                     X_WGabove = RigidTransform([0.0, 0.0, approach_height]) @ X_WG
-                    with _padding(arm, options.near_padding):
+                    with _near(arm, options):
                         line = plan_cartesian(arm, q_drop, X_WGabove)
                     if not line.found:
                         reason = f"line down: {line.reason}"
@@ -310,12 +316,26 @@ def _configurations(
             q, error = refine(arm, X_WG, q_default if k == 1 else start)
             if error > 1e-6 or any(np.max(np.abs(q - other)) < 0.1 for other in found):
                 continue
-            with _padding(arm, options.near_padding):
+            with _near(arm, options):
                 if arm.is_free(q):
                     found.append(q)
                 else:
                     reason = f"collides: {arm.collisions(q)}"
     return sorted(found, key=lambda q: travel_time(arm, q_start, q)), reason
+
+
+def _back_off(arm: ArmModel, back: np.ndarray, distance: float, options: MoveOptions) -> np.ndarray:
+    """The path back from a grasp, made longer where its end is not clear, if that helps."""
+    for factor in (2.0, 3.0):
+        if arm.is_free(back[-1]):
+            break
+        X_WGpre = arm.pose(back[0]) @ RigidTransform([0.0, -factor * distance, 0.0])
+        with _near(arm, options):
+            longer = plan_cartesian(arm, back[0], X_WGpre)
+        if not longer.found:
+            break
+        back = longer.path
+    return back
 
 
 def _free_path(
@@ -325,11 +345,15 @@ def _free_path(
     rng: np.random.Generator,
     options: MoveOptions,
 ) -> tuple[np.ndarray | None, str]:
-    """A path with the model's clearance, or with the small one where an end needs that."""
-    ends_clear = arm.is_free(q_start) and arm.is_free(q_goal)
-    with _padding(arm, arm.padding if ends_clear else options.near_padding):
-        result = plan_joint_path(arm, q_start, q_goal, rng=rng)
+    """A path with the model's clearance and heights, or without where an end needs that."""
+    clear = _are_clear(arm, q_start, q_goal)
+    with nullcontext() if clear else _near(arm, options, refine_by=1.0):
+        result = plan_joint_path(arm, q_start, q_goal, rng=rng, max_iterations=options.samples)
     return (result.path, "") if result.found else (None, result.reason)
+
+
+def _are_clear(arm: ArmModel, *ends: np.ndarray) -> bool:
+    return all(arm.is_free(q) for q in ends)
 
 
 def _timed(
@@ -339,19 +363,26 @@ def _timed(
     held: object,
     options: MoveOptions,
 ) -> tuple[TimedPath | None, str]:
-    """One motion along all paths, checked again as it will be moved."""
+    """One motion along a free path and straight lines, checked again as it will be moved."""
     path = join_paths(*paths)
     speed = np.concatenate(
         [np.full(len(join_paths(p)) - 1, v) for p, v in zip(paths, speeds, strict=True)]
     )
     acceleration = options.acceleration if held is None else options.carry_acceleration
     limits = arm.limits.scaled(1.0, acceleration)
+    free = paths[0]
+    heights = arm.heights if _are_clear(arm, free[0], free[-1]) else None
     reason = ""
     for deviation in (options.deviation, 0.2 * options.deviation, 1e-3):
         motion = time_parameterize(path, limits, speed=speed, deviation=deviation)
-        with _padding(arm, min(arm.padding, 0.5 * options.near_padding)):
-            samples = motion.sample()
-            if arm.path_is_free(samples):
+        samples = motion.sample()
+        corner = int(np.argmin(np.linalg.norm(samples - free[-1], axis=1)))
+        with _near(arm, replace(options, near_padding=0.5 * options.near_padding)):
+            ok = arm.path_is_free(samples)
+            if ok and heights is not None:
+                arm.set_heights(heights)
+                ok = arm.path_is_free(samples[: corner + 1])
+            if ok:
                 return motion, ""
             reason = f"the motion collides: {arm.first_collision(samples) or 'on its way'}"
     return None, reason
@@ -362,14 +393,18 @@ def _speed(held: object, options: MoveOptions) -> float:
 
 
 @contextmanager
-def _padding(arm: ArmModel, padding: float) -> Iterator[None]:
-    """Another clearance for a while."""
-    before = arm.padding
-    arm.set_padding(padding)
+def _near(arm: ArmModel, options: MoveOptions, refine_by: float = 3.0) -> Iterator[None]:
+    """Close to objects for a while: a small clearance, checked finely, and no heights."""
+    padding, step, heights = arm.padding, arm.checker.edge_step_size(), arm.heights
+    arm.set_padding(min(padding, options.near_padding))
+    arm.checker.set_edge_step_size(step / refine_by)
+    arm.set_heights(None)
     try:
         yield
     finally:
-        arm.set_padding(before)
+        arm.set_padding(padding)
+        arm.checker.set_edge_step_size(step)
+        arm.set_heights(heights)
 
 
 @contextmanager
