@@ -1,4 +1,4 @@
-"""Cross-references of docstrings (``:class:`~a.b.C```) as links, with the last name as their text."""
+"""Cross-references of docstrings (``:class:`~a.b.C```) as links, the last name as their text."""
 
 import re
 
