@@ -1,0 +1,101 @@
+"""Sliders of the Meshcat page: declared in Python, moved in the browser, read as an array."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint, JointIndex, PrismaticJoint
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One slider.
+
+    Attributes:
+        name: its label, unique on the page.
+        lower, upper: its range (lower < upper).
+        step: smallest change (> 0).
+        value: where it starts.
+        decrease, increase: codes of the keys that move it by one step, such as "KeyA"
+            (the UI Events specification lists them); "" for none.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    step: float
+    value: float
+    decrease: str = ""
+    increase: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name with its keys: "x (A, D)"."""
+        if not self.decrease:
+            return self.name
+        keys = (k.removeprefix("Key").removeprefix("Digit") for k in (self.decrease, self.increase))
+        return f"{self.name} ({', '.join(keys)})"
+
+
+def add_sliders(meshcat: Meshcat, sliders: Sequence[Slider]) -> None:
+    """Puts sliders on the page.
+
+    Args:
+        meshcat: the page.
+        sliders: in the order in which they are shown; their labels must be new.
+    """
+    for s in sliders:
+        meshcat.AddSlider(
+            s.label, s.lower, s.upper, s.step, s.value,
+            decrement_keycode=s.decrease, increment_keycode=s.increase,
+        )  # fmt: skip
+
+
+def read_sliders(meshcat: Meshcat, sliders: Sequence[Slider]) -> NDArray[np.float64]:
+    """The values of sliders now.
+
+    Args:
+        meshcat: the page.
+        sliders: those to read.
+
+    Returns:
+        (n,) values, in the order of ``sliders``.
+    """
+    return np.array([meshcat.GetSliderValue(s.label) for s in sliders])
+
+
+def remove_sliders(meshcat: Meshcat, sliders: Sequence[Slider]) -> None:
+    """Takes sliders off the page; those that are not there are no error."""
+    for s in sliders:
+        meshcat.DeleteSlider(s.label, strict=False)
+
+
+def joint_sliders(
+    plant: MultibodyPlant, positions: NDArray[np.float64]
+) -> list[tuple[Joint, Slider]]:
+    """A slider for each joint of one degree of freedom.
+
+    Args:
+        plant: a finalized plant.
+        positions: (num_positions,) where the sliders start.
+
+    Returns:
+        Joints and their sliders in the plant's order. The label is "model joint"; joints without
+        limits get one turn, or half a metre, to each side.
+    """
+    found = []
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(JointIndex(index))
+        if joint.num_positions() != 1:
+            continue
+        value = float(positions[joint.position_start()])
+        wide = 0.5 if joint.type_name() == PrismaticJoint.kTypeName else np.pi
+        lower, upper = joint.position_lower_limit(), joint.position_upper_limit()
+        lower = lower if np.isfinite(lower) else value - wide
+        upper = upper if np.isfinite(upper) else value + wide
+        name = f"{plant.GetModelInstanceName(joint.model_instance())} {joint.name()}"
+        found.append((joint, Slider(name, lower, upper, 1e-3, value)))
+    return found
