@@ -43,8 +43,8 @@ def d415_camera_config(
 ) -> CameraConfig:
     """Settings of a camera like Intel's RealSense D415, depth aligned to colour.
 
-    Its colour sensor sees 42.5 degrees from top to bottom with square pixels (a focal length of
-    617 pixels at 480 lines), and depth begins at 0.3 m (Intel RealSense D400 series data sheet,
+    Its colour sensor sees 42.6 degrees from top to bottom with square pixels (a focal length of
+    615 pixels at 480 lines); depth begins at 0.3 m (Intel RealSense D400 series data sheet,
     337029, sections 3 and 4).
 
     Args:
@@ -58,11 +58,12 @@ def d415_camera_config(
     Returns:
         Drake's settings, to be put into ``Scenario.cameras``.
     """
+    focal = 615.0 * height / 480.0
     return CameraConfig(
         name=name,
         width=width,
         height=height,
-        focal=CameraConfig.FovDegrees(y=42.5),
+        focal=CameraConfig.FocalLength(x=focal, y=focal),
         z_near=0.3,
         z_far=5.0,
         X_PB=Transform(X_PC) if not base_frame else _transform(base_frame, X_PC),
