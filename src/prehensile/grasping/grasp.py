@@ -42,7 +42,7 @@ class GraspConfig:
     unseen_side: float = 0.25
     # Weights of the penalties, each against a contact quality of 0 to 1; 0 or more:
     # tilt of the approach (times 1 - cos),
-    weight_tilt: float = 0.6
+    weight_tilt: float = 1.0
     # horizontal distance to the object's centre (per 0.1 m),
     weight_offset: float = 0.5
     # opening (as a share of the largest),

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from prehensile.grasping.candidates import Candidates
-from prehensile.grasping.collision import boxes_overlap
+from prehensile.grasping.collision import hand_hits_boxes, hand_hits_points
+from prehensile.grasping.columns import columns, largest, room_beside
 from prehensile.grasping.grasp import GraspConfig, GraspStatus
 from prehensile.grasping.gripper import ParallelGripper
 from prehensile.perception.cloud import Box, Cloud
 from prehensile.perception.segmentation import resting_pairs
 
-# Width of the cells into which a column is divided along x [m].
-_CELL = 0.0025
 # An object narrower than this [m] must be seen from both sides: what looks like free space behind
 # its one side may be its own inside.
 _MIN_UNSEEN_SPAN = 0.03
@@ -130,11 +129,26 @@ def evaluate(
         _evaluate_columns(candidates, rows, cloud, segments, centres, burdens, gripper, config, out)
     alive = np.nonzero(out.status == GraspStatus.FOUND)[0]
     if len(obstacles) > 0 and len(alive) > 0:
-        hits = _hits_obstacles(candidates.R_WP, out, alive, gripper, obstacles, config)
+        hits = hand_hits_boxes(
+            candidates.R_WP[alive],
+            out.p_WP[alive],
+            out.width[alive],
+            gripper,
+            obstacles,
+            margin=config.obstacle_margin,
+            approach=config.approach,
+        )
         out.status[alive[hits]] = GraspStatus.HITS_OBSTACLES
         alive = alive[~hits]
     for rows in _places(candidates.seed, alive):
-        hits = _hand_hits_cloud(candidates.R_WP, out, rows, cloud, gripper, config)
+        hits = hand_hits_points(
+            candidates.R_WP[rows],
+            out.p_WP[rows],
+            out.width[rows],
+            gripper,
+            cloud.points,
+            margin=config.margin,
+        )
         out.status[rows[hits]] = GraspStatus.HITS_CLOUD
     out.score[out.status != GraspStatus.FOUND] = -np.inf
     return out
@@ -177,16 +191,12 @@ def _evaluate_columns(
     room = gripper.finger_thickness + 2 * config.min_clearance
     reach = gripper.max_gap + room
     half_z = 0.5 * gripper.finger[0].width + config.margin
-    near, x, y, z = _local(cloud.points, R, p, np.hypot(reach, max(-base, tip)))
-    i, n = np.nonzero(
-        (np.abs(z) <= half_z) & (y <= tip + config.margin) & (y >= base) & (np.abs(x) <= reach)
-    )
-    x, y, z, n = x[i, n].astype(float), y[i, n], z[i, n], near[n]
+    i, n, x, y, z = columns(cloud.points, R, p, (reach, half_z), (base, tip + config.margin))
 
-    x_left, x_right = _room_beside(i, x, m, room, reach)
+    x_left, x_right = room_beside(i, x, m, room, reach)
     between = (x > x_left[i]) & (x < x_right[i])
-    low = -_largest(i[between], -x[between], m)
-    high = _largest(i[between], x[between], m)
+    low = -largest(i[between], -x[between], m)
+    high = largest(i[between], x[between], m)
     wide = ~np.isfinite(x_left) | ~np.isfinite(x_right) | ~np.isfinite(low)
 
     # What a pad can touch: neither surfaces that face the palm, nor, on its side of the object,
@@ -204,7 +214,7 @@ def _evaluate_columns(
     touch, seen, side = {}, {}, {}
     for sign, end in ((-1, -low), (1, high)):
         side[sign] = beside & (sign * normal_x > -0.5) & (sign * (x_pad - middle[k]) > 0)
-        reached = _largest(k[side[sign]], sign * x_pad[side[sign]], m)
+        reached = largest(k[side[sign]], sign * x_pad[side[sign]], m)
         seen[sign] = np.isfinite(reached)
         touch[sign] = np.where(seen[sign], reached, end)
     with np.errstate(invalid="ignore"):
@@ -271,126 +281,3 @@ def _evaluate_columns(
     for name, term in terms.items():
         out.terms[name][rows] = term
     out.score[rows] = sum(terms.values())
-
-
-def _room_beside(
-    i: NDArray[np.int64], x: NDArray[np.float64], m: int, room: float, reach: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where the first stretches of length ``room`` without points begin, left and right of x = 0.
-
-    Args:
-        i: (P,) which column a point is in, 0..m-1.
-        x: (P,) its coordinate, at most ``reach`` in absolute value.
-        m: number of columns.
-        room: length [m].
-        reach: how far to look [m].
-
-    Returns:
-        (m,) their inner ends left (negative) and right, nan where there is no such stretch.
-    """
-    half = int(np.ceil(reach / _CELL))
-    need = int(np.ceil(room / _CELL))
-    taken = np.zeros((m, 2 * half + 2), dtype=np.int64)
-    np.add.at(taken, (i, np.floor(x / _CELL + 0.5).astype(np.int64) + half + 1), 1)
-    before = np.cumsum(taken, axis=1)  # before[:, b]: points in cells 0 to b-1
-    free = before[:, need:] == before[:, :-need]  # whether cells b to b+need-1 are free
-    right, left = free[:, half:], free[:, : half - need + 1][:, ::-1]
-    x_right = (np.argmax(right, axis=1) - 0.5) * _CELL
-    x_left = -(np.argmax(left, axis=1) + 0.5) * _CELL
-    return (
-        np.where(left.any(axis=1), x_left, np.nan),
-        np.where(right.any(axis=1), x_right, np.nan),
-    )
-
-
-def _local(
-    points: NDArray[np.float64], R: NDArray[np.float64], p: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Coordinates of the points near any of the frames (R, p), in every one of them.
-
-    Returns:
-        The indices (n,) of all points within ``radius`` of any of the frames' origins (and some
-        further ones), and their x, y and z, each (m, n). Single precision: it is relative to a
-        point nearby.
-    """
-    middle = p.mean(axis=0)
-    limit = radius + np.linalg.norm(p - middle, axis=1).max()
-    q = points - middle
-    near = np.nonzero(np.einsum("nk,nk->n", q, q) <= limit**2)[0]
-    q = q[near].astype(np.float32)
-    shift = np.einsum("mik,mi->km", R, p - middle).astype(np.float32)
-    axes = R.astype(np.float32)
-    x, y, z = (
-        axes[:, 0, k, None] * q[:, 0]
-        + axes[:, 1, k, None] * q[:, 1]
-        + (axes[:, 2, k, None] * q[:, 2] - shift[k, :, None])
-        for k in range(3)
-    )
-    return near, x, y, z
-
-
-def _largest(index: NDArray[np.int64], values: NDArray[np.float64], m: int) -> NDArray[np.float64]:
-    """(m,) largest of the values of each index; -inf where there is none."""
-    result = np.full(m, -np.inf)
-    np.maximum.at(result, index, values)
-    return result
-
-
-def _hits_obstacles(
-    R_WP: NDArray[np.float64],
-    out: Evaluation,
-    rows: NDArray[np.int64],
-    gripper: ParallelGripper,
-    obstacles: Sequence[Box],
-    config: GraspConfig,
-) -> NDArray[np.bool_]:
-    """Which of the candidates ``rows`` touch an obstacle on the way in or at the end."""
-    R = R_WP[rows]
-    p_WG = out.p_WP[rows] - R @ gripper.p_GPad
-    centres_G, sizes = gripper.boxes(out.width[rows], config.approach)
-    centres = p_WG[:, None] + np.einsum("mij,mbj->mbi", R, centres_G)
-    hits = np.zeros(len(rows), dtype=bool)
-    for X_WB, size in obstacles:
-        overlap = boxes_overlap(
-            R[:, None],
-            centres,
-            sizes + 2 * config.obstacle_margin,
-            np.asarray(X_WB.rotation().matrix(), dtype=float),
-            np.asarray(X_WB.translation(), dtype=float),
-            np.asarray(size, dtype=float),
-        )
-        hits |= overlap.any(axis=1)
-    return hits
-
-
-def _hand_hits_cloud(
-    R_WP: NDArray[np.float64],
-    out: Evaluation,
-    rows: NDArray[np.int64],
-    cloud: Cloud,
-    gripper: ParallelGripper,
-    config: GraspConfig,
-) -> NDArray[np.bool_]:
-    """Which of the candidates ``rows`` have points in the hand, or above it on its way in."""
-    R, p = R_WP[rows], out.p_WP[rows]
-    # These parts lie behind the pads: most of the scene is below them, if the hand points down.
-    behind = gripper.p_GPad[1] - max(part.y[1] for part in gripper.finger[1:] + gripper.body)
-    beside = max(part.x[1] for part in gripper.finger[1:] + gripper.body) + 0.5 * gripper.max_width
-    lowest = p[:, 2] - behind * R[:, 2, 1] - beside * np.hypot(R[:, 2, 0], R[:, 2, 2])
-    above = cloud.points[:, 2] >= lowest.min() - 2 * config.margin
-    _, x, y, z = _local(cloud.points[above], R, p, 0.25)
-    y += np.float32(gripper.p_GPad[1])  # from G's origin
-    np.abs(x, out=x)
-    np.abs(z, out=z)
-    hits = np.zeros(len(rows), dtype=bool)
-    half_width = 0.5 * out.width[rows, None].astype(np.float32)
-    for parts, shift in ((gripper.finger[1:], half_width), (gripper.body, 0 * half_width)):
-        for part in parts:
-            inside = (
-                (y <= part.y[1] + config.margin)
-                & (z <= 0.5 * part.width + config.margin)
-                & (x - shift >= part.x[0] - config.margin)
-                & (x - shift <= part.x[1] + config.margin)
-            )
-            hits |= inside.any(axis=1)
-    return hits
