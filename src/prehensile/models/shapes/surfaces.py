@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from prehensile.errors import Finding, InputError
 from prehensile.models.shapes import checks
 from prehensile.models.shapes.mesh import Mesh, merge, shade
-from prehensile.models.shapes.outlines import offset, triangulate
+from prehensile.models.shapes.outlines import offset, signed_area, triangulate
 
 CREASE = np.radians(35.0)  # faces that meet at more than this keep a sharp edge
 
@@ -113,6 +113,8 @@ def extrude(
     points = checks.array("outline", outline, 2, 3)
     checks.segments("outline points", len(points))
     checks.positive("depth", depth)
+    if signed_area(points) <= 0.0:
+        raise InputError(Finding("outline is not counter-clockwise", "reverse it", key="outline"))
     checks.in_range("bevel", bevel, 0.0, 0.499 * depth)
     if bevel == 0.0:
         return loft([points, points], [0.0, depth], crease=crease)
