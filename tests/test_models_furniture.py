@@ -41,7 +41,7 @@ def test_bin_has_the_interior_that_it_says() -> None:
         assert distance(0.0, -0.16, z) == pytest.approx(0.03, abs=1e-9)
     assert distance(0.0, 0.0, 0.05) == pytest.approx(0.04, abs=1e-9)  # floor at 0.01
     assert distance(0.3, 0.0, 0.27) == pytest.approx(0.10, abs=1e-9)  # walls up to 0.17
-    assert distance(0.0, 0.0, -0.02) == pytest.approx(0.02, abs=1e-9)  # underside at 0
+    assert distance(0.295, 0.205, -0.02) == pytest.approx(0.02, abs=1e-9)  # stands at 0
     assert distance(0.29, 0.0, 0.1) < 0.0  # walls are thick
 
 
@@ -76,10 +76,43 @@ def test_nothing_flies_through_the_walls_of_the_bin(v_WB: tuple[float, float, fl
     assert 0.03 < p_WB[2] < 0.17
 
 
+@pytest.mark.parametrize("name", ["table", "bin", "shelves", "cupboard"])
+def test_it_stands_still_on_its_feet(name: str) -> None:
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(
+        time_step=0.005,
+        contact_model="hydroelastic_with_fallback",
+        discrete_contact_approximation="sap",
+    )
+    plant, _ = AddMultibodyPlant(config, builder)
+    parser = Parser(plant)
+    parser.package_map().AddMap(package_map())
+    (instance,) = parser.AddModelsFromUrl(find_model(name).url)
+    ground = ProximityProperties()
+    ground.AddProperty("material", "coulomb_friction", CoulombFriction(0.5, 0.5))
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform([0, 0, -0.5]), Box(3, 3, 1), "ground", ground
+    )
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    body = plant.GetBodyByName("base_link", instance)
+    height = 0.75 if name == "table" else 0.0
+    plant.SetFreeBodyPose(context, body, RigidTransform([0.0, 0.0, height + 0.002]))
+    simulator.AdvanceTo(1.0)
+    X_WB = plant.EvalBodyPoseInWorld(context, body)
+    np.testing.assert_allclose(X_WB.translation(), [0.0, 0.0, height], atol=1e-3)
+    for t in np.arange(1.05, 2.0, 0.05):
+        simulator.AdvanceTo(t)
+        assert plant.EvalKineticEnergy(context) < 1e-6
+    moved = X_WB.InvertAndCompose(plant.EvalBodyPoseInWorld(context, body))
+    assert np.linalg.norm(moved.translation()) < 1e-5
+
+
 def test_shelves_have_three_compartments_open_to_the_front() -> None:
     shelves = scene("shelves", weld="base_link")
     column = [shelves.distance("base_link", np.array([0.1, 0.0, z])) for z in
-              np.arange(0.0005, 0.8, 0.001)]  # fmt: skip
+              np.arange(0.0015, 0.8, 0.001)]  # fmt: skip
     inside = np.array(column) < 0.0
     starts = np.flatnonzero(inside[1:] & ~inside[:-1])
     assert inside[0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from model_checks import scene, visual_files
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from prehensile.models.registry import load_spheres
 from prehensile.models.shapes import read_gltf
@@ -49,7 +49,7 @@ def test_what_is_seen_is_what_touches(name: str) -> None:
             [part.mesh.vertices[part.mesh.faces].mean(axis=1) for part in read_gltf(file)]
         )
         if name.startswith("iiwa"):
-            tree = cKDTree(np.concatenate([vertices, on_faces]))
+            tree = KDTree(np.concatenate([vertices, on_faces]))
             touching = made.surface_points(body, rng, 300)
             touching = touching[(body != "iiwa_link_0") | (touching[:, 2] > 0.01)]  # the open foot
             assert tree.query(touching)[0].max() < 0.04

@@ -116,7 +116,7 @@ def polygonize(field: Field, low: ArrayLike, high: ArrayLike, step: float) -> Me
     cells = tuple(counts - 1)
     corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
 
-    def corner(array: np.ndarray, c: tuple[int, int, int]) -> np.ndarray:
+    def corner(array: np.ndarray, c: tuple[int, ...]) -> np.ndarray:
         return array[tuple(slice(o, o + n) for o, n in zip(c, cells, strict=True))]
 
     total, crossings = np.zeros((*cells, 3)), np.zeros(cells)

@@ -36,6 +36,12 @@ def blocks() -> list[Block]:
     return boards
 
 
+def feet() -> list[tuple[float, float, float]]:
+    """Where the sides stand."""
+    x, y = DEPTH / 2 - BOARD / 2, WIDTH / 2 - BOARD / 2
+    return [(x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0)]
+
+
 def visual_parts() -> list[Part]:
     """The boards, each along its own grain."""
     boards = []

@@ -44,12 +44,14 @@ def blocks() -> list[Block]:
 def model() -> Model:
     """The bin."""
     parts = blocks()
+    x, y = INNER[0] / 2 + WALL / 2, INNER[1] / 2 + WALL / 2  # under the walls
+    feet = [(x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0)]
     visuals = (Visual("bin", Shape("mesh", uri="bin.gltf")),)
     comment = (
         "A container for picking. The origin is the middle of its underside, z up, x along the"
         f" length; interior {INNER[0]:g} x {INNER[1]:g} m from z = {FLOOR:g} to {TOP:g}."
     )
-    return Model("bin", comment, (link("base_link", MASS, parts, PLASTIC, visuals),))
+    return Model("bin", comment, (link("base_link", MASS, parts, PLASTIC, visuals, feet),))
 
 
 def visual_parts() -> list[Part]:

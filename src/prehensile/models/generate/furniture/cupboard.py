@@ -86,7 +86,7 @@ def model() -> Model:
     """The cupboard."""
     parts = _carcass.blocks()
     visuals = (Visual("carcass", Shape("mesh", uri="carcass.gltf")),)
-    body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals)
+    body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals, _carcass.feet())
     # Left and right as seen by one who stands before the cupboard and looks at it.
     left, right = door("left_door", -1), door("right_door", 1)
     joints = tuple(

@@ -15,7 +15,7 @@ def model() -> Model:
     parts = _carcass.blocks()
     visuals = (Visual("shelves", Shape("mesh", uri="shelves.gltf")),)
     comment = "Shelves. The origin is the middle of the underside, z up, open to the front, +x."
-    body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals)
+    body = link("base_link", _carcass.MASS, parts, _carcass.WOOD, visuals, _carcass.feet())
     return Model("shelves", comment, (body,))
 
 

@@ -37,9 +37,10 @@ def blocks() -> list[Block]:
 def model() -> Model:
     """The table."""
     parts = blocks()
+    feet = [(*leg.pose[:2], -HEIGHT) for leg in parts[1:]]
     visuals = (Visual("table", Shape("mesh", uri="table.gltf")),)
     comment = "A work table. The origin is the middle of its top surface, z up, x along the length."
-    return Model("table", comment, (link("base_link", MASS, parts, LAMINATE, visuals),))
+    return Model("table", comment, (link("base_link", MASS, parts, LAMINATE, visuals, feet),))
 
 
 def visual_parts() -> list[Part]:
