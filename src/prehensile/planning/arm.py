@@ -109,7 +109,7 @@ class ArmModel:
         self._fingers = [joint for joint in hand_joints if joint.num_positions() == 1]
         self._hand_bodies = plant.GetBodyIndices(hand_instance)
 
-        wrist = joints[max(0, len(joints) - 3)]
+        wrist = joints[max(0, len(joints) - 2)]
         self._points = body_points(diagram, plant.GetBodiesKinematicallyAffectedBy([wrist.index()]))
         weights = np.full(plant.num_positions(), 1.0)
         weights[self._index] = _lever_arms(plant, self._index, arm_instance, hand_instance)
@@ -227,13 +227,16 @@ class ArmModel:
             return True
         length = float(np.linalg.norm((q_B - q_A) * self.weights))
         count = int(np.ceil(length / self.checker.edge_step_size())) + 1
-        return not any(
-            self._too_low((1.0 - u) * q_A + u * q_B) for u in np.linspace(0.0, 1.0, count)
-        )
+        u = np.linspace(0.0, 1.0, count)[:, None]
+        return self.is_above_heights((1.0 - u) * q_A + u * q_B)
 
     def path_is_free(self, path: np.ndarray) -> bool:
         """Whether all edges of the path, (K, n), are free."""
         return all(self.edge_is_free(a, b) for a, b in pairwise(path))
+
+    def is_above_heights(self, path: np.ndarray) -> bool:
+        """Whether hand, wrist and what is held are above the heights at each q of (K, n)."""
+        return not any(self._too_low(q) for q in path)
 
     def first_collision(self, path: np.ndarray) -> str:
         """The first configuration of a path (K, n) that collides, in words ("" if none does)."""
@@ -264,6 +267,8 @@ class ArmModel:
         if self._heights is None:
             return False
         X_WG = self.pose(q)
+        if not self._heights.comes_near(X_WG.translation()):
+            return False
         clouds = [] if self._held_points is None else [X_WG.multiply(self._held_points.T).T]
         for index, p_BP in self._points:
             X_WB = self.plant.EvalBodyPoseInWorld(self._context, self.plant.get_body(index))

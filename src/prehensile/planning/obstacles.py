@@ -9,7 +9,8 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.planning import RobotDiagram
 from scipy.ndimage import maximum_filter
 
-_SPACING = 0.02  # m between neighbouring points on the surface of a shape
+_SPACING = 0.025  # m between neighbouring points on the surface of a shape
+_REACH = 0.4  # m from the frame of a hand to anything of it, or in it, or to the wrist
 
 
 class HeightMap:
@@ -31,6 +32,7 @@ class HeightMap:
         rim = int(np.ceil(clearance / cell - 1e-9))
         self._heights = np.full((1, 1), -np.inf)
         self._low = np.zeros(2)
+        self._top = -np.inf
         if len(points) == 0:
             return
         cells = np.floor(points[:, :2] / cell).astype(int)
@@ -39,6 +41,13 @@ class HeightMap:
         np.maximum.at(heights, tuple((cells - first).T), points[:, 2])
         self._low = first * cell
         self._heights = maximum_filter(heights, 2 * rim + 1) + clearance
+        self._top = float(self._heights.max())
+
+    def comes_near(self, p_WG: np.ndarray) -> bool:
+        """Whether a hand at a point (3,) may have anything below the surface; quick to tell."""
+        size = np.array(self._heights.shape) * self._cell
+        beside = np.maximum(self._low - p_WG[:2], p_WG[:2] - self._low - size)
+        return bool(p_WG[2] - _REACH < self._top and beside.max() < _REACH)
 
     def lowers(self, p_WP: np.ndarray) -> bool:
         """Whether any of the points (N, 3) is below the surface."""
@@ -53,13 +62,13 @@ class HeightMap:
         x, y = (np.arange(n) for n in self._heights.shape)
         centers = [self._low[k] + (i + 0.5) * self._cell for k, i in enumerate((x, y))]
         square = (centers[0][:, None] - p_WC[0]) ** 2 + (centers[1] - p_WC[1]) ** 2
-        cut._low = self._low
+        cut._low, cut._top = self._low, self._top
         cut._heights = np.where(square < radius**2, -np.inf, self._heights)
         return cut
 
 
 def box_points(obb: Obb, X_FS: RigidTransform) -> np.ndarray:
-    """Points (K, 3) in F, at most 2 cm apart, on the surface of a box of the shape frame S."""
+    """Points (K, 3) in F, at most 2.5 cm apart, on the surface of a box of the shape frame S."""
     half = obb.half_width()
     axes = [np.linspace(-h, h, int(np.ceil(2.0 * h / _SPACING)) + 1) for h in half]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

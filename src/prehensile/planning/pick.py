@@ -381,7 +381,7 @@ def _timed(
             ok = arm.path_is_free(samples)
             if ok and heights is not None:
                 arm.set_heights(heights)
-                ok = arm.path_is_free(samples[: corner + 1])
+                ok = arm.is_above_heights(samples[: corner + 1])
             if ok:
                 return motion, ""
             reason = f"the motion collides: {arm.first_collision(samples) or 'on its way'}"
