@@ -18,6 +18,7 @@ from pydrake.geometry import (
     RenderEngineGlParams,
     RenderEngineGltfClientParams,
     RenderEngineVtkParams,
+    Rgba,
     Role,
     SceneGraph,
 )
@@ -241,7 +242,7 @@ def _make_renderer(scenario: Scenario, key: str) -> RenderEngine:
             _fail(scenario, key, "renderer_class", f"unknown renderer '{wanted}'", f"use {known}")
         wanted = named[wanted]()
         if isinstance(wanted, RenderEngineVtkParams):
-            wanted.default_clear_color = [background.r(), background.g(), background.b()]
+            wanted.default_clear_color = _rgb(background)
         else:
             wanted.default_clear_color = background
     if isinstance(wanted, RenderEngineGlParams) and not os.environ.get("DISPLAY"):
@@ -250,13 +251,16 @@ def _make_renderer(scenario: Scenario, key: str) -> RenderEngine:
             "none; it is rendered by RenderEngineVtk",
             stacklevel=2,
         )
-        clear = wanted.default_clear_color
-        wanted = RenderEngineVtkParams(default_clear_color=[clear.r(), clear.g(), clear.b()])
+        wanted = RenderEngineVtkParams(default_clear_color=_rgb(background))
     if isinstance(wanted, RenderEngineGlParams):
         return MakeRenderEngineGl(wanted)
     if isinstance(wanted, RenderEngineGltfClientParams):
         return MakeRenderEngineGltfClient(wanted)
     return MakeRenderEngineVtk(wanted)
+
+
+def _rgb(color: Rgba) -> list[float]:
+    return [color.r(), color.g(), color.b()]
 
 
 def _fail(scenario: Scenario, key: str, field: str, message: str, mend: str) -> NoReturn:

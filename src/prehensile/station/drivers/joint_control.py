@@ -87,8 +87,9 @@ def _actuator_names(site: Site) -> list[str]:
     names = []
     for model, instance in zip(site.models, site.instances, strict=True):
         prefix = f"{model}_" if len(site.models) > 1 else ""
-        for index in site.plant.GetJointActuatorIndices(instance):
-            names.append(prefix + site.plant.get_joint_actuator(index).name())
+        # Before the plant is finalized it lists actuators for all models together only.
+        every = (site.plant.get_joint_actuator(i) for i in site.plant.GetJointActuatorIndices())
+        names += [prefix + a.name() for a in every if a.model_instance() == instance]
     for name in site.config.gains:
         if name not in names:
             known = ", ".join(names)
@@ -99,8 +100,19 @@ def _actuator_names(site: Site) -> list[str]:
 def _joint_limits(site: Site) -> GuardLimits:
     """Limits of all driven models' joints, one model after the other."""
     each = [GuardLimits.of_plant(site.plant, instance) for instance in site.instances]
-    fields = [f.name for f in dc.fields(GuardLimits) if f.name != "jump"]
-    return GuardLimits(**{name: sum((getattr(e, name) for e in each), ()) for name in fields})
+
+    def joined(name: str) -> tuple[float, ...]:
+        return tuple(value for limits in each for value in getattr(limits, name))
+
+    return GuardLimits(
+        position_lower=joined("position_lower"),
+        position_upper=joined("position_upper"),
+        velocity=joined("velocity"),
+        acceleration=joined("acceleration"),
+        effort_lower=joined("effort_lower"),
+        effort_upper=joined("effort_upper"),
+        effort_default=joined("effort_default"),
+    )
 
 
 def _joined_state(site: Site) -> OutputPort:
