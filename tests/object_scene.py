@@ -110,9 +110,12 @@ def floor_scene(time_step: float, names: Mapping[str, str]) -> Scene:
 
 
 def bin_scene(time_step: float, names: Mapping[str, str]) -> Scene:
-    """Objects above a bin with an interior of 0.56 x 0.38 x 0.16 m, its floor at z = 0."""
+    """Objects in a shaft over a bin of 0.56 x 0.38 m, its floor at z = 0.
+
+    The walls go up so far that what is dropped from a height cannot bounce out.
+    """
     scene = new_scene(time_step, names)
-    x, y, z, thick = 0.56, 0.38, 0.16, 0.05
+    x, y, z, thick = 0.56, 0.38, 1.8, 0.05
     add_wall(scene.plant, "floor", [x + 1, y + 1, 0.1], [0, 0, -0.05])
     for sign in (-1.0, 1.0):
         add_wall(
