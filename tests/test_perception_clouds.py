@@ -15,6 +15,7 @@ from prehensile.perception import (
     downsample,
     fuse_depth_images,
     inside_box,
+    resting_pairs,
 )
 
 K = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
@@ -172,3 +173,21 @@ def test_wrong_input_is_refused() -> None:
         fuse_depth_images([], [K], [], Box(RigidTransform(), np.ones(3)), 0.005)
     with pytest.raises(InputError, match="voxel_size"):
         downsample(Cloud(points, np.tile([0.0, 0.0, 1.0], (2, 1))), 0.0)
+
+
+def test_what_stands_on_a_box_is_told_from_what_stands_beside_it() -> None:
+    voxel = 0.004
+    base = box_faces(np.array([0.12, 0.12, 0.06]), RigidTransform([0, 0, 0.03]), voxel)
+    above = box_faces(np.array([0.05, 0.05, 0.06]), RigidTransform([0, 0, 0.09]), voxel)
+    beside = box_faces(np.array([0.06, 0.06, 0.1]), RigidTransform([0.09, 0, 0.05]), voxel)
+    clouds = [base, above, beside]
+    cloud = Cloud(
+        np.concatenate([c.points for c in clouds]), np.concatenate([c.normals for c in clouds])
+    )
+    labels = np.repeat(np.arange(3), [len(c) for c in clouds])
+    resting = resting_pairs(cloud, labels, voxel)
+    assert resting[0, 1] > 50  # 0.2 m of seam
+    assert resting[1, 0] == 0
+    assert resting[2].sum() == resting[1].sum() == 0
+    # The box beside touches the upper edge of the base, but along 6 cm alone.
+    assert resting[0, 2] < 0.5 * resting[0, 1]

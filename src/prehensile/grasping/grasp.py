@@ -16,6 +16,8 @@ class GraspConfig:
 
     # Surface points from which candidates are made; 1 or more.
     num_seeds: int = 120
+    # Rounds of sampling before giving up; each has fresh seeds, the first success ends it; >= 1.
+    rounds: int = 3
     # Edge of the voxels of the cloud [m]; above 0.
     voxel_size: float = 0.004
     # Largest angle between the approach and straight down [rad]; 0 to pi/2.
@@ -66,7 +68,7 @@ class GraspConfig:
         Raises:
             InputError: with every field that is out of its range.
         """
-        positive = ("num_seeds", "voxel_size", "tilt_step", "contact_depth", "max_grasps")
+        positive = ("num_seeds", "rounds", "voxel_size", "tilt_step", "contact_depth", "max_grasps")
         angles = {"max_tilt": np.pi / 2, "max_contact_angle": np.pi / 2, "min_angle": np.pi}
         faults = []
         for f in fields(self):

@@ -48,27 +48,39 @@ def select_grasps(
         return GraspResult(GraspStatus.NO_POINTS)
     if segments is None:
         segments = convex_segments(cloud, config.voxel_size)
-    candidates = antipodal_candidates(cloud, segments, rng, config)
-    if len(candidates) == 0:
-        return GraspResult(GraspStatus.NO_SIDES)
-    first = evaluate(candidates, cloud, segments, gripper, obstacles, config)
-    counts = Counter(first.status)
-    best = _distinct(candidates, first, config)
-    candidates, first = candidates.select(best), first.select(best)
-    turned = _aligned(candidates, first)
-    second = evaluate(turned, cloud, segments, gripper, obstacles, config)
-    second.score[turned.R_WP[:, 2, 1] > -np.cos(config.max_tilt)] = -np.inf
-
-    better = second.score > first.score
-    R_WP = np.where(better[:, None, None], turned.R_WP, candidates.R_WP)
-    final = first.replaced(better, second)
-    grasps = tuple(
-        _as_grasp(R_WP[k], final, k, gripper)
-        for k in _distinct(dc.replace(candidates, R_WP=R_WP), final, config)
-    )
-    if grasps:
-        return GraspResult(GraspStatus.FOUND, grasps, counts)
+    counts: Counter[GraspStatus] = Counter()
+    for _ in range(config.rounds):
+        candidates = antipodal_candidates(cloud, segments, rng, config)
+        if len(candidates) == 0:
+            return GraspResult(GraspStatus.NO_SIDES)
+        evaluation = evaluate(candidates, cloud, segments, gripper, obstacles, config)
+        counts.update(evaluation.status)
+        best = _distinct(candidates, evaluation, config)
+        if len(best) > 0:
+            candidates, evaluation = candidates.select(best), evaluation.select(best)
+            grasps = _polished(candidates, evaluation, cloud, segments, gripper, obstacles, config)
+            return GraspResult(GraspStatus.FOUND, grasps, counts)
     return GraspResult(counts.most_common(1)[0][0], (), counts)
+
+
+def _polished(
+    candidates: Candidates,
+    evaluation: Evaluation,
+    cloud: Cloud,
+    segments: NDArray[np.int64],
+    gripper: ParallelGripper,
+    obstacles: Sequence[Box],
+    config: GraspConfig,
+) -> tuple[Grasp, ...]:
+    """Distinct grasps from feasible candidates, each turned to its contacts if that is better."""
+    turned = _aligned(candidates, evaluation)
+    second = evaluate(turned, cloud, segments, gripper, obstacles, config)
+    allowed = turned.R_WP[:, 2, 1] <= -np.cos(config.max_tilt)
+    better = allowed & (second.score > evaluation.score)
+    R_WP = np.where(better[:, None, None], turned.R_WP, candidates.R_WP)
+    final = evaluation.replaced(better, second)
+    order = _distinct(dc.replace(candidates, R_WP=R_WP), final, config)
+    return tuple(_as_grasp(R_WP[k], final, k, gripper) for k in order)
 
 
 def _aligned(candidates: Candidates, evaluation: Evaluation) -> Candidates:
