@@ -15,7 +15,6 @@ from rich.console import Console
 import prehensile
 
 BROWSERS = (
-    "open",
     "firefox",
     "chromium",
     "chromium-browser",
@@ -184,8 +183,8 @@ def check_compiler() -> Check:
 
 def check_display() -> Check:
     """Display"""
-    if platform.system() != "Linux":
-        return Check("Display", f"{platform.system()} has one of its own")
+    if platform.system() == "Darwin":
+        return Check("Display", "macOS has one of its own")
     for variable in ("WAYLAND_DISPLAY", "DISPLAY"):
         if os.environ.get(variable):
             return Check("Display", f"{variable}={os.environ[variable]}")
@@ -195,6 +194,8 @@ def check_display() -> Check:
 
 def check_browser() -> Check:
     """Web browser"""
+    if platform.system() == "Darwin":
+        return Check("Web browser", "macOS has one of its own")
     for name in BROWSERS:
         if shutil.which(name):
             return Check("Web browser", name)
