@@ -90,14 +90,24 @@ def test_motions_are_free_and_within_limits(arm, pick):
 
 
 def test_the_held_object_is_kept_clear(arm):
-    long_bar = (Box(0.03, 0.5, 0.03), RigidTransform([0.0, 0.3, 0.0]))
-    X_WDrop = grasp(*(np.array(BIN1) - BIN0), z=0.35)
-    start = arm.q_default
+    long_bar = (Box(0.03, 0.3, 0.03), RigidTransform([0.0, 0.2, 0.0]))
+    over_bin1 = np.array(BIN1) - BIN0
+    X_WDrop = grasp(*over_bin1, z=0.3)
+    high = plan_place(arm, arm.q_default, [grasp(*over_bin1, z=0.55)])
+    start = high.carry.q_end
     assert plan_place(arm, start, [X_WDrop]).found
     refused = plan_place(arm, start, [X_WDrop], held=long_bar)
     assert not refused.found
     assert "wsg::body" in refused.reason
     assert not arm.checker.GetAllAddedCollisionShapes().get("held")  # put down again
+
+
+def test_a_held_shape_that_touches_at_the_start_does_not_stop_the_arm(arm):
+    deep = plan_pick(arm, arm.q_default, [grasp(0.0, 0.0)]).approach.q_end
+    wide = (Box(0.6, 0.1, 0.1), RigidTransform([0.0, 0.12, 0.0]))
+    X_WDrop = grasp(*(np.array(BIN1) - BIN0), z=0.35)
+    assert plan_place(arm, deep, [X_WDrop]).found
+    assert plan_place(arm, deep, [X_WDrop], held=wide).found
 
 
 def test_same_seed_same_plan(arm):

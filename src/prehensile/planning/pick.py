@@ -231,15 +231,18 @@ def plan_place(
         drops: poses X_WG at which the hand opens, best first.
         approach_height: length of the straight lines down to the drop and up again (m); 0 to
             drop from where the free motion ends.
-        held: shape of the object in the hand and its pose X_GS; keeps clear of everything.
+        held: shape of the object in the hand and its pose X_GS; keeps clear of everything. A
+            shape that touches something at the start already is an estimate too large to be
+            kept clear, and is not.
         flip: whether the hand may be turned by half a turn about its approach axis.
         rng: of all random choices; seed 0 if it is not given.
         options: how to move.
     """
     rng = np.random.default_rng(0) if rng is None else rng
     rejected: list[str] = []
+    shape = held if _starts_clear(arm, q_start, held, options) else None
     for index, X_WDrop in enumerate(drops[: options.max_poses]):
-        with _holding(arm, held):
+        with _holding(arm, shape):
             poses = [X_WDrop, X_WDrop @ X_GFlipped] if flip else [X_WDrop]
             choices, reason = _configurations(arm, poses, q_start, rng, options)
             for q_drop in choices:
@@ -350,6 +353,16 @@ def _free_path(
     with nullcontext() if clear else _near(arm, options, refine_by=1.0):
         result = plan_joint_path(arm, q_start, q_goal, rng=rng, max_iterations=options.samples)
     return (result.path, "") if result.found else (None, result.reason)
+
+
+def _starts_clear(
+    arm: ArmModel,
+    q_start: np.ndarray,
+    held: tuple[Shape, RigidTransform] | None,
+    options: MoveOptions,
+) -> bool:
+    with _holding(arm, held), _near(arm, options):
+        return arm.is_free(q_start)
 
 
 def _are_clear(arm: ArmModel, *ends: np.ndarray) -> bool:
