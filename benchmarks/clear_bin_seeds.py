@@ -21,7 +21,7 @@ COLUMNS = ("seed", "cleared", "moved/tried", "sim s", "s/pick", "wall/sim", "cpu
 
 def main() -> int:
     """Runs the seeds and prints a line each, then the totals."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Ten seeds with ten objects each, as a table.")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--objects", type=int, default=10)

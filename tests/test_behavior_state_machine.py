@@ -59,9 +59,7 @@ def run():
             (ConstantVectorSource([0.03, 0.0]), "hand_state"),
             (ConstantValueSource(AbstractValue.Make("a picture")), "picture"),
         ):
-            builder.Connect(
-                builder.AddSystem(source).get_output_port(), machine.GetInputPort(port)
-            )
+            builder.Connect(builder.AddSystem(source).get_output_port(), machine.GetInputPort(port))
         log = LogVectorOutput(machine.GetOutputPort("position"), builder, 0.005)
         diagram = builder.Build()
         simulator = Simulator(diagram)
@@ -73,7 +71,7 @@ def run():
 
 
 def test_the_command_is_the_motion_that_was_decided(run):
-    task, status, log = run(2.0)
+    _, status, log = run(2.0)
     # Three ramps of 0.5 s one after the other are one ramp to 1.5 rad, which is then held. A
     # command is the state before the update of its instant: one command period late.
     expected = np.clip(log.sample_times() - 0.005, 0.0, 1.5)
