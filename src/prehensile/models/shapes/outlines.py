@@ -107,7 +107,9 @@ def _find_ear(points: np.ndarray, left: list[int]) -> int | None:
 
     height = turn(a, ring, c)
     span = np.linalg.norm(c - a, axis=1) ** 2
-    # Short diagonals first: a fan of slivers shades and collides badly.
+    # Short diagonals first: a fan of slivers shades and collides badly. Rounded, so that the
+    # choice among equals does not hang on the last digit.
+    span = np.round(span / max(span.max(), 1e-300), 9)
     for k in np.argsort(np.where(height > 0.0, span, np.inf), kind="stable"):
         if height[k] <= 0.0:
             break

@@ -137,7 +137,7 @@ class Panel:
     def paint(self, colors: ArrayLike) -> None:
         """Covers the sheet with a picture (rows, columns, 3) of values 0..255."""
         pixels = np.clip(np.asarray(colors), 0, 255).astype(np.uint8)
-        picture = Image.fromarray(pixels, "RGB")
+        picture = Image.fromarray(pixels)
         self._image.paste(picture.resize(self._image.size, Image.Resampling.BICUBIC))
 
     def png(self, colors: int = 64) -> bytes:

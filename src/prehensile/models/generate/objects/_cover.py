@@ -23,12 +23,13 @@ def cover(collisions: Sequence[Collision]) -> np.ndarray:
     stick_out = float(np.clip(0.25 * extent.min(), *_STICK_OUT))
     spacing = float(np.prod(extent) / _SAMPLES) ** (1.0 / 3.0)
     points = np.concatenate([_samples(c, spacing) @ R.T + p for (R, p), c in placed])
-    radii = np.round(stick_out - signed_distance(collisions, points), 5)
+    # Rounded off their ties, so that every machine chooses the same spheres.
+    radii = np.round(stick_out - signed_distance(collisions, points) + 1e-9, 5)
     # The space between the samples must be covered too; a corner may look out a little.
     reach = radii - 0.3 * spacing + _LOOK_OUT
     norms = (points**2).sum(axis=1)
     squares = norms[:, None] + norms - 2.0 * points @ points.T
-    covers = squares <= np.maximum(reach, 1e-4)[:, None] ** 2
+    covers = squares <= np.maximum(reach, 1e-4)[:, None] ** 2 + 1e-10
     gains = covers.sum(axis=1)
     chosen = []
     open_points = np.ones(len(points), dtype=bool)
@@ -45,7 +46,7 @@ def _samples(collision: Collision, spacing: float) -> np.ndarray:
     """Points (N, 3) in and on a shape, in its own frame, about ``spacing`` m apart."""
 
     def steps(length: float) -> int:
-        return max(1, round(length / spacing))
+        return max(1, round(length / spacing + 1e-6))
 
     kind, size = collision.shape.kind, collision.shape.size
     if kind == "box":
@@ -58,7 +59,7 @@ def _samples(collision: Collision, spacing: float) -> np.ndarray:
     points = []
     for z in np.linspace(-straight - cap, straight + cap, max(2, steps(2 * (straight + cap))) + 1):
         over = max(0.0, abs(z) - straight)
-        wide = float(np.sqrt(max(0.0, radius**2 - over**2)))
+        wide = round(float(np.sqrt(max(0.0, radius**2 - over**2))), 6)  # 0 at the poles
         for r in np.linspace(0.0, wide, steps(wide) + 1):
             turn = np.linspace(0.0, 2.0 * np.pi, max(6, steps(2.0 * np.pi * r)), endpoint=False)
             ring = [r * np.cos(turn), r * np.sin(turn), np.full(len(turn), z)]
