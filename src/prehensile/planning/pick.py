@@ -1,8 +1,7 @@
-"""Plans of whole moves of an arm with a hand: to a grasp and up, to a drop and away, and home."""
+"""Plans of picking and placing: to a grasp and up, to a drop and away."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import Shape
@@ -11,55 +10,32 @@ from pydrake.math import RigidTransform, RotationMatrix
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import plan_cartesian
 from prehensile.planning.inverse_kinematics import refine, starting_points
-from prehensile.planning.joint_path import plan_joint_path
-from prehensile.planning.trajectory import TimedPath, join_paths, time_parameterize
+from prehensile.planning.moves import (
+    MoveOptions,
+    MovePlan,
+    free_path,
+    holding,
+    near,
+    plan_move,
+    timed,
+)
+from prehensile.planning.trajectory import TimedPath, time_parameterize
+
+__all__ = [
+    "MoveOptions",
+    "MovePlan",
+    "PickPlan",
+    "PlacePlan",
+    "X_GFlipped",
+    "drop_poses",
+    "plan_move",
+    "plan_pick",
+    "plan_place",
+    "travel_time",
+]
 
 # The same grasp with the two fingers exchanged: half a turn about the approach axis.
 X_GFlipped = RigidTransform(RotationMatrix.MakeYRotation(np.pi))
-
-
-@dataclass(frozen=True)
-class MoveOptions:
-    """How to move.
-
-    Attributes:
-        speed: factor on the joint velocity limits of free motions, in (0, 1].
-        near_speed: the same on straight lines near objects, in (0, 1].
-        carry_speed: the same with an object in the hand, in (0, 1].
-        acceleration: factor on the joint acceleration limits, in (0, 1].
-        carry_acceleration: the same with an object in the hand, in (0, 1].
-        near_padding: clearance from the surroundings on straight lines near objects (m), checked
-            three times as finely; free motions keep the arm model's own clearance where their
-            ends allow it.
-        deviation: how far free motions may pass from their corners (rad).
-        starts: starts of inverse kinematics per pose (>= 1).
-        samples: samples of a path search before it gives up (>= 1).
-        max_poses: grasps or drops tried before giving up (>= 1).
-    """
-
-    speed: float = 0.8
-    near_speed: float = 0.5
-    carry_speed: float = 0.7
-    acceleration: float = 0.9
-    carry_acceleration: float = 0.6
-    near_padding: float = 0.001
-    deviation: float = 0.05
-    starts: int = 5
-    samples: int = 300
-    max_poses: int = 20
-
-
-@dataclass(frozen=True)
-class MovePlan:
-    """A motion to one configuration; `motion` is None where none was found."""
-
-    motion: TimedPath | None
-    reason: str = ""
-
-    @property
-    def found(self) -> bool:
-        """Whether there is a motion."""
-        return self.motion is not None
 
 
 @dataclass(frozen=True)
@@ -120,33 +96,6 @@ class PlacePlan:
         return "" if self.found else "; ".join(self.rejected) or "no drops were given"
 
 
-def plan_move(
-    arm: ArmModel,
-    q_start: np.ndarray,
-    q_goal: np.ndarray,
-    *,
-    rng: np.random.Generator | None = None,
-    held: tuple[Shape, RigidTransform] | None = None,
-    options: MoveOptions = MoveOptions(),
-) -> MovePlan:
-    """A collision-free motion from one configuration to another, such as home.
-
-    Args:
-        arm: the arm and its surroundings.
-        q_start, q_goal: ends of the motion (n,).
-        rng: of the search; seed 0 if it is not given.
-        held: shape of an object in the hand and its pose X_GS.
-        options: how to move.
-    """
-    rng = np.random.default_rng(0) if rng is None else rng
-    with _holding(arm, held):
-        path, reason = _free_path(arm, q_start, q_goal, rng, options)
-        if path is None:
-            return MovePlan(None, reason)
-        motion, reason = _timed(arm, [path], [_speed(held, options)], held, options)
-        return MovePlan(motion, reason)
-
-
 def plan_pick(
     arm: ArmModel,
     q_start: np.ndarray,
@@ -188,17 +137,17 @@ def plan_pick(
             X_WG = arm.pose(q_grasp)
             X_WGpre = X_WG @ RigidTransform([0.0, -pregrasp_distance, 0.0])
             X_WGlift = RigidTransform([0.0, 0.0, lift_height]) @ X_WG
-            with _near(arm, options):
+            with near(arm, options):
                 back = plan_cartesian(arm, q_grasp, X_WGpre)
                 up = plan_cartesian(arm, q_grasp, X_WGlift) if back.found else back
             if not up.found:
                 reason = ("approach: " if not back.found else "lift: ") + up.reason
                 continue
             line = _back_off(arm, back.path, pregrasp_distance, options)
-            path, reason = _free_path(arm, q_start, line[-1], rng, options)
+            path, reason = free_path(arm, q_start, line[-1], rng, options)
             if path is None:
                 continue
-            approach, reason = _timed(
+            approach, reason = timed(
                 arm, [path, line[::-1]], [options.speed, options.near_speed], None, options
             )
             lift = time_parameterize(
@@ -242,7 +191,7 @@ def plan_place(
     rejected: list[str] = []
     shape = held if _starts_clear(arm, q_start, held, options) else None
     for index, X_WDrop in enumerate(drops[: options.max_poses]):
-        with _holding(arm, shape):
+        with holding(arm, shape):
             poses = [X_WDrop, X_WDrop @ X_GFlipped] if flip else [X_WDrop]
             choices, reason = _configurations(arm, poses, q_start, rng, options)
             for q_drop in choices:
@@ -250,16 +199,16 @@ def plan_place(
                 up = np.array([q_drop])
                 if approach_height > 0.0:
                     X_WGabove = RigidTransform([0.0, 0.0, approach_height]) @ X_WG
-                    with _near(arm, options):
+                    with near(arm, options):
                         line = plan_cartesian(arm, q_drop, X_WGabove)
                     if not line.found:
                         reason = f"line down: {line.reason}"
                         continue
                     up = line.path
-                path, reason = _free_path(arm, q_start, up[-1], rng, options)
+                path, reason = free_path(arm, q_start, up[-1], rng, options)
                 if path is None:
                     continue
-                carry, reason = _timed(
+                carry, reason = timed(
                     arm, [path, up[::-1]], [options.carry_speed, options.near_speed], held, options
                 )
                 if carry is not None:
@@ -319,7 +268,7 @@ def _configurations(
             q, error = refine(arm, X_WG, q_default if k == 1 else start)
             if error > 1e-6 or any(np.max(np.abs(q - other)) < 0.1 for other in found):
                 continue
-            with _near(arm, options):
+            with near(arm, options):
                 if arm.is_free(q):
                     found.append(q)
                 else:
@@ -333,26 +282,12 @@ def _back_off(arm: ArmModel, back: np.ndarray, distance: float, options: MoveOpt
         if arm.is_free(back[-1]):
             break
         X_WGpre = arm.pose(back[0]) @ RigidTransform([0.0, -factor * distance, 0.0])
-        with _near(arm, options):
+        with near(arm, options):
             longer = plan_cartesian(arm, back[0], X_WGpre)
         if not longer.found:
             break
         back = longer.path
     return back
-
-
-def _free_path(
-    arm: ArmModel,
-    q_start: np.ndarray,
-    q_goal: np.ndarray,
-    rng: np.random.Generator,
-    options: MoveOptions,
-) -> tuple[np.ndarray | None, str]:
-    """A path with the model's clearance and heights, or without where an end needs that."""
-    clear = _are_clear(arm, q_start, q_goal)
-    with nullcontext() if clear else _near(arm, options, refine_by=1.0):
-        result = plan_joint_path(arm, q_start, q_goal, rng=rng, max_iterations=options.samples)
-    return (result.path, "") if result.found else (None, result.reason)
 
 
 def _starts_clear(
@@ -361,73 +296,5 @@ def _starts_clear(
     held: tuple[Shape, RigidTransform] | None,
     options: MoveOptions,
 ) -> bool:
-    with _holding(arm, held), _near(arm, options):
+    with holding(arm, held), near(arm, options):
         return arm.is_free(q_start)
-
-
-def _are_clear(arm: ArmModel, *ends: np.ndarray) -> bool:
-    return all(arm.is_free(q) for q in ends)
-
-
-def _timed(
-    arm: ArmModel,
-    paths: Sequence[np.ndarray],
-    speeds: Sequence[float],
-    held: object,
-    options: MoveOptions,
-) -> tuple[TimedPath | None, str]:
-    """One motion along a free path and straight lines, checked again as it will be moved."""
-    path = join_paths(*paths)
-    speed = np.concatenate(
-        [np.full(len(join_paths(p)) - 1, v) for p, v in zip(paths, speeds, strict=True)]
-    )
-    acceleration = options.acceleration if held is None else options.carry_acceleration
-    limits = arm.limits.scaled(1.0, acceleration)
-    free = paths[0]
-    heights = arm.heights if _are_clear(arm, free[0], free[-1]) else None
-    reason = ""
-    for deviation in (options.deviation, 0.2 * options.deviation, 1e-3):
-        motion = time_parameterize(path, limits, speed=speed, deviation=deviation)
-        samples = motion.sample()
-        corner = int(np.argmin(np.linalg.norm(samples - free[-1], axis=1)))
-        with _near(arm, replace(options, near_padding=0.5 * options.near_padding)):
-            ok = arm.path_is_free(samples)
-            if ok and heights is not None:
-                arm.set_heights(heights)
-                ok = arm.is_above_heights(samples[: corner + 1])
-            if ok:
-                return motion, ""
-            reason = f"the motion collides: {arm.first_collision(samples) or 'on its way'}"
-    return None, reason
-
-
-def _speed(held: object, options: MoveOptions) -> float:
-    return options.speed if held is None else options.carry_speed
-
-
-@contextmanager
-def _near(arm: ArmModel, options: MoveOptions, refine_by: float = 3.0) -> Iterator[None]:
-    """Close to objects for a while: a small clearance, checked finely, and no heights."""
-    padding, step, heights = arm.padding, arm.checker.edge_step_size(), arm.heights
-    arm.set_padding(min(padding, options.near_padding))
-    arm.checker.set_edge_step_size(step / refine_by)
-    arm.set_heights(None)
-    try:
-        yield
-    finally:
-        arm.set_padding(padding)
-        arm.checker.set_edge_step_size(step)
-        arm.set_heights(heights)
-
-
-@contextmanager
-def _holding(arm: ArmModel, held: tuple[Shape, RigidTransform] | None) -> Iterator[None]:
-    """An object in the hand for a while."""
-    if held is None:
-        yield
-        return
-    arm.attach(*held)
-    try:
-        yield
-    finally:
-        arm.detach()
