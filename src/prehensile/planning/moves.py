@@ -44,6 +44,9 @@ class MoveOptions:
     max_poses: int = 20
 
 
+DEFAULT_OPTIONS = MoveOptions()
+
+
 @dataclass(frozen=True)
 class MovePlan:
     """A motion to one configuration; `motion` is None where none was found."""
@@ -64,7 +67,7 @@ def plan_move(
     *,
     rng: np.random.Generator | None = None,
     held: tuple[Shape, RigidTransform] | None = None,
-    options: MoveOptions = MoveOptions(),
+    options: MoveOptions = DEFAULT_OPTIONS,
 ) -> MovePlan:
     """A collision-free motion from one configuration to another, such as home.
 

@@ -11,6 +11,7 @@ from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import plan_cartesian
 from prehensile.planning.inverse_kinematics import refine, starting_points
 from prehensile.planning.moves import (
+    DEFAULT_OPTIONS,
     MoveOptions,
     MovePlan,
     free_path,
@@ -105,7 +106,7 @@ def plan_pick(
     pregrasp_distance: float = 0.1,
     lift_height: float = 0.25,
     rng: np.random.Generator | None = None,
-    options: MoveOptions = MoveOptions(),
+    options: MoveOptions = DEFAULT_OPTIONS,
 ) -> PickPlan:
     """Motions to the first of the grasps, in their order, that can be reached.
 
@@ -170,7 +171,7 @@ def plan_place(
     held: tuple[Shape, RigidTransform] | None = None,
     flip: bool = True,
     rng: np.random.Generator | None = None,
-    options: MoveOptions = MoveOptions(),
+    options: MoveOptions = DEFAULT_OPTIONS,
 ) -> PlacePlan:
     """Motions to the first of the drop poses, in their order, that can be reached.
 
