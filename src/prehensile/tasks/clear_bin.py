@@ -10,8 +10,6 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake import geometry
-from pydrake.math import RigidTransform
 
 from prehensile.behavior.state_machine import Decision, Senses
 from prehensile.behavior.trajectory_player import Segment, SegmentPlayer
@@ -22,16 +20,15 @@ from prehensile.grasping import (
     ParallelGripper,
     select_grasps,
 )
-from prehensile.perception import Box, Cloud, fuse_depth_images
+from prehensile.perception import Cloud, convex_segments, fuse_depth_images
 from prehensile.planning.arm import ArmModel
+from prehensile.planning.obstacles import HeightMap
 from prehensile.planning.pick import (
-    PlacePlan,
-    drop_poses,
     plan_move,
     plan_pick,
-    plan_place,
 )
 from prehensile.planning.trajectory import TimedPath
+from prehensile.tasks.clear_bin_moves import BinGeometry, held_box, plan_drop, plan_nudge
 from prehensile.tasks.report import Attempt
 
 
@@ -57,44 +54,14 @@ class ClearBinConfig:
     pregrasp_distance: float = 0.08
     # Straight line up out of the bin [m]; above 0.
     lift_height: float = 0.24
+    # Around the grasp, what is seen is taken to be lifted with it [m]; 0 or more.
+    lifted_radius: float = 0.09
     # Grasps within this distance of one that failed are tried last [m]; 0 or more.
     failed_distance: float = 0.03
     # Height above the floor of the second bin at which the lowest point held is let go [m].
     drop_height: float = 0.08
     # Settings of grasp selection.
     grasp: GraspConfig = dc.field(default_factory=GraspConfig)
-
-
-@dc.dataclass(frozen=True)
-class BinGeometry:
-    """What is known of a bin.
-
-    Attributes:
-        X_WB: its pose.
-        low, high: corners of its interior in its frame B (3,), up to the rim.
-        walls: its floor and walls as boxes in W.
-    """
-
-    X_WB: RigidTransform
-    low: np.ndarray
-    high: np.ndarray
-    walls: Sequence[Box]
-
-    def region(self, *, inset: float, above_floor: float, above_rim: float) -> Box:
-        """The part of the interior to look at: inset from the walls, in W."""
-        low = self.low + np.array([inset, inset, above_floor])
-        high = self.high + np.array([-inset, -inset, above_rim])
-        return Box(self.X_WB @ RigidTransform(0.5 * (low + high)), high - low)
-
-    @property
-    def depth(self) -> float:
-        """From the inner floor to the rim."""
-        return float(self.high[2] - self.low[2])
-
-    @property
-    def floor_height(self) -> float:
-        """Height of the inner floor in W, the bin standing upright."""
-        return float((self.X_WB @ RigidTransform(self.low)).translation()[2])
 
 
 @dc.dataclass(frozen=True)
@@ -136,7 +103,7 @@ class Memory:
 
 
 class ClearBin:
-    """States: ``look``, ``pick``, ``lift``, ``carry``, ``release``, ``retreat``, ``done``."""
+    """States: look, pick, lift, carry, release, retreat, nudge, done."""
 
     def __init__(
         self,
@@ -187,7 +154,7 @@ class ClearBin:
             return None
         if state == "look":
             return self._look(memory, time, senses)
-        if pick is None:  # after a failure
+        if pick is None:  # after a failure or a nudge
             return self._next(memory)
         if state == "pick" and holding:
             return self._move("lift", memory, pick.lift)
@@ -239,12 +206,18 @@ class ClearBin:
         rng = np.random.default_rng([self._seed, number])
         attempt = Attempt(number, now, now, "unfinished", "the run ended", points=len(cloud))
 
+        segments = convex_segments(cloud, config.grasp.voxel_size)
+        heights = HeightMap(cloud.points)
+        self._arm.set_heights(heights)
+
         def give_up(outcome: str, reason: str) -> Decision:
             failed = dc.replace(attempt, think_wall=time.perf_counter() - started)
             again = _settle(memory, failed, now, outcome, reason)
-            return self._next(again, self._open(memory.q, config.think_time))
+            return self._nudge(again, cloud, segments, rng)
 
-        result = select_grasps(cloud, self._gripper, self._pick_bin.walls, config.grasp, rng)
+        result = select_grasps(
+            cloud, self._gripper, self._pick_bin.walls, config.grasp, rng, segments=segments
+        )
         if not result.success:
             return give_up("no grasp", result.status.value)
         grasps = self._untried_first(result.grasps, memory.failed)
@@ -261,7 +234,19 @@ class ClearBin:
         if plan.approach is None or plan.lift is None or plan.X_WG is None:
             return give_up("no path", plan.reason)
         grasp = grasps[plan.index]
-        place = self._plan_place(plan.X_WG, plan.lift.q_end, grasp.span, rng)
+        p_WPad = plan.X_WG.multiply(self._gripper.p_GPad)
+        self._arm.set_heights(heights.cut(p_WPad, config.lifted_radius))
+        floor_height = self._pick_bin.floor_height
+        held = held_box(cloud, segments, plan.X_WG, grasp.span, self._gripper, floor_height)
+        place = plan_drop(
+            self._arm,
+            plan.lift.q_end,
+            held,
+            self._place_bin,
+            self._gripper,
+            config.drop_height,
+            rng,
+        )
         if place.carry is None:
             return give_up("no path", place.reason)
         attempt = dc.replace(
@@ -300,45 +285,49 @@ class ClearBin:
 
         return sorted(grasps, key=tried)
 
-    def _plan_place(
-        self, X_WG: RigidTransform, q_start: np.ndarray, span: float, rng: np.random.Generator
-    ) -> PlacePlan:
-        """Carries what was grasped at X_WG over the second bin, clear of everything on the way."""
-        p_GPad = self._gripper.p_GPad
-        # Nothing that lay in the bin reached lower than its floor.
-        hang = (X_WG @ RigidTransform(p_GPad)).translation()[2] - self._pick_bin.floor_height
-        shape = geometry.Box(span, hang, self._gripper.pad_width)
-        X_GHeld = RigidTransform(p_GPad + np.array([0.0, 0.5 * hang, 0.0]))
-        # The fingers stay above the rim: the second bin may be full by now.
-        place = self._place_bin
-        pads_above_floor = max(hang + self.config.drop_height, place.depth + 0.02)
-        p_WDrop = place.X_WB.translation().copy()
-        p_WDrop[2] = place.floor_height + pads_above_floor + p_GPad[1]
-        return plan_place(
+    def _nudge(
+        self, memory: Memory, cloud: Cloud, segments: np.ndarray, rng: np.random.Generator
+    ) -> Decision:
+        """Nothing can be picked as it lies: moves something, then goes home and looks again."""
+        config = self.config
+        if memory.failures >= config.max_failures:
+            return self._next(memory)
+        nudge = plan_nudge(
             self._arm,
-            q_start,
-            drop_poses(p_WDrop, np.array([0.12, 0.05, 0.0]), rng, count=8),
-            approach_height=0.0,
-            held=(shape, X_GHeld),
-            rng=rng,
+            memory.q,
+            cloud,
+            segments,
+            self._pick_bin,
+            self._gripper,
+            rng,
+            lift_height=config.lift_height,
         )
+        if nudge is None:
+            return self._next(memory, self._open(memory.q, config.think_time))
+        motions = [nudge.approach, nudge.drag, nudge.lift]
+        segments_played = [Segment.wait(memory.q, 0.0, config.think_time)]
+        segments_played += [Segment.move(motion, 0.0) for motion in motions]
+        home, q = self._go_home(nudge.lift.q_end, rng)
+        return Decision("nudge", dc.replace(memory, q=q), SegmentPlayer([*segments_played, home]))
 
     def _retreat(self, memory: Memory, pick: Pick, *, lifted: bool) -> Decision:
         """Lets go of what may be left, rises out of the bin and goes home, out of the view."""
         width = pick.attempt.width
-        q = pick.lift.q_end
         segments = []
         if not lifted:
             segments.append(Segment.wait(memory.q, width, self.config.open_time))
             segments.append(Segment.move(pick.lift, width))
         rng = np.random.default_rng([self._seed, len(memory.attempts), 1])
+        home, q = self._go_home(pick.lift.q_end, rng)
+        return Decision("retreat", dc.replace(memory, q=q), SegmentPlayer([*segments, home]))
+
+    def _go_home(self, q: np.ndarray, rng: np.random.Generator) -> tuple[Segment, np.ndarray]:
+        """Home with an open hand, and where that ends: there, or here if there is no way."""
+        width = self._gripper.max_width
         home = plan_move(self._arm, q, self._q_home, rng=rng).motion
-        if home is not None:
-            segments.append(Segment.move(home, self._gripper.max_width))
-            q = home.q_end
-        else:
-            segments.append(Segment.wait(q, self._gripper.max_width, self.config.open_time))
-        return Decision("retreat", dc.replace(memory, q=q), SegmentPlayer(segments))
+        if home is None:
+            return Segment.wait(q, width, self.config.open_time), q
+        return Segment.move(home, width), home.q_end
 
 
 def _settle(memory: Memory, attempt: Attempt, now: float, outcome: str, reason: str) -> Memory:

@@ -31,7 +31,8 @@ from prehensile.station.build import build
 from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario
-from prehensile.tasks.clear_bin import BinGeometry, Camera, ClearBin, ClearBinConfig, Memory
+from prehensile.tasks.clear_bin import Camera, ClearBin, ClearBinConfig, Memory
+from prehensile.tasks.clear_bin_moves import BinGeometry
 from prehensile.tasks.report import ClearBinReport, ObjectResult
 
 _STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C

@@ -197,7 +197,6 @@ def run_pick_place(
         The report; Ctrl-C ends the simulation and leaves the report of what was.
     """
     scenario = load_scenario("pick_brick")
-    scenario.visualization.publish_contacts = False  # arrows that hide the brick
     arm = ArmModel(make_robot_diagram(scenario))
     started = time.perf_counter()
     sequence, reason = plan_pick_place(arm, X_WStart, X_WGoal, seed=seed)
