@@ -2,6 +2,14 @@
 
 import argparse
 import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+    from pydrake.systems.analysis import Simulator
+
+    from prehensile.station.scenario import Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +77,9 @@ def check_live_arguments(args: argparse.Namespace) -> None:
         check_writable(Path(args.record))
 
 
-def simulate(args, scenario, simulator, meshcat) -> int:
+def simulate(
+    args: argparse.Namespace, scenario: "Scenario", simulator: "Simulator", meshcat: "Meshcat"
+) -> int:
     """Simulates a station in the page until time is up, the button is pressed or Ctrl-C.
 
     Args:
@@ -96,10 +106,11 @@ def simulate(args, scenario, simulator, meshcat) -> int:
     ApplySimulatorConfig(scenario.simulator_config, simulator)
     if args.realtime_rate is not None:
         simulator.set_target_realtime_rate(args.realtime_rate)
-    print(f"watch at {meshcat.web_url()}  (stop: the Stop button, Escape in the page, or Ctrl-C)")
+    hint = "stop: the Stop button, Escape in the page, or Ctrl-C"
+    print(f"watch at {meshcat.web_url()}  ({hint})", flush=True)
     with ExitStack() as stack:
         if args.record:
-            stack.callback(print, f"replay: {args.record}")
+            stack.push(_announce(args.record))
             stack.enter_context(Recorder(meshcat, args.record))
         simulator.Initialize()
         total = duration if math.isfinite(duration) else None
@@ -110,3 +121,13 @@ def simulate(args, scenario, simulator, meshcat) -> int:
         f"{result.real_time_factor:.2f} x real time"
     )
     return 0
+
+
+def _announce(path: str) -> Callable[..., None]:
+    """An exit function that says where the replay is, if it was saved."""
+
+    def announce(kind: type | None, error: BaseException | None, trace: object) -> None:
+        if error is None or isinstance(error, KeyboardInterrupt):
+            print(f"replay: {path}")
+
+    return announce

@@ -38,5 +38,6 @@ def run(args: argparse.Namespace) -> int:
     with progress(f"building {name}"):
         station = build(scenario, meshcat=meshcat)
         simulator = Simulator(teleoperate(station, scenario, meshcat, mode=args.mode, arm=args.arm))
-    print("sliders: keys stand beside their names; gamepad: press a button in the page to wake it")
+    print("sliders: 'Open Controls' at the top right of the page; keys stand beside their names")
+    print("gamepad: press one of its buttons in the page to wake it")
     return simulate(args, scenario, simulator, meshcat)

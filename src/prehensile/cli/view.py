@@ -57,7 +57,9 @@ def run(args: argparse.Namespace) -> int:
         add_visualization(scenario.visualization, robot_builder.builder(), scene_graph, meshcat)
         diagram = robot_builder.Build()
         spheres = sphere_models(scenario, plant) if args.spheres else {}
-    print(f"look at {meshcat.web_url()}  (stop: the Stop button, Escape in the page, or Ctrl-C)")
+    print("sliders and buttons: 'Open Controls' at the top right of the page")
+    hint = "stop: the Stop button, Escape in the page, or Ctrl-C"
+    print(f"look at {meshcat.web_url()}  ({hint})", flush=True)
     view(diagram, plant, meshcat, spheres=spheres, duration=args.duration)
     return 0
 
@@ -87,7 +89,7 @@ def find(what: str) -> "Scenario":
     if path.suffix in _MODEL_SUFFIXES and not what.startswith("package://"):
         if not path.is_file():
             raise InputError(Finding("no such file", file=what))
-        name, url = path.stem, path.resolve().as_uri()
+        name, url = path.stem, f"file://{path.resolve()}"
     elif what.startswith("package://") or what in names:
         info = find_model(what)
         name, url = info.name, info.url

@@ -99,17 +99,17 @@ def teleoperate(
     Raises:
         InputError: the scenario has no such arm, or the arm cannot move in the plane.
     """
-    gamepad = meshcat.GetGamepad if gamepad is None else gamepad
+    read_gamepad = meshcat.GetGamepad if gamepad is None else gamepad
     driven = find_arm(station, scenario, arm)
     builder = DiagramBuilder()
     builder.AddSystem(station)
     if mode == "joints":
-        source = builder.AddNamedSystem("joints", _joint_source(driven, meshcat, gamepad))
+        source = builder.AddNamedSystem("joints", _joint_source(driven, meshcat, read_gamepad))
         commands = source.GetOutputPort("values")
     else:
         planar = mode == "planar"
         make = _planar_source if planar else _pose_source
-        source = builder.AddNamedSystem("pose", make(driven, meshcat, gamepad))
+        source = builder.AddNamedSystem("pose", make(driven, meshcat, read_gamepad))
         ik = builder.AddNamedSystem("differential_ik", pose_follower(driven, scenario, planar))
         builder.Connect(source.GetOutputPort("pose"), ik.GetInputPort("X_AE_desired"))
         # The integrator starts where the arm is, then runs open loop.
@@ -121,7 +121,7 @@ def teleoperate(
     builder.Connect(smoothing.get_output_port(), station.GetInputPort(f"{driven.name}.position"))
     if driven.hand and station.HasInputPort(f"{driven.hand}.position"):
         width = float(_measured(station, f"{driven.hand}.state_measured")[0])
-        hand = builder.AddNamedSystem("hand", _hand_source(width, meshcat, gamepad))
+        hand = builder.AddNamedSystem("hand", _hand_source(width, meshcat, read_gamepad))
         builder.Connect(
             hand.GetOutputPort("values"), station.GetInputPort(f"{driven.hand}.position")
         )
@@ -208,7 +208,7 @@ def pose_follower(arm: Arm, scenario: Scenario, planar: bool) -> System:
                 )
             )
         speed = np.where(turning, speed, 0.0)
-        parameters.set_end_effector_velocity_flag([False, True, False, True, False, True])
+        parameters.set_end_effector_velocity_flag(np.array([False, True, False, True, False, True]))
     parameters.set_joint_velocity_limits((-speed, speed))
     parameters.set_joint_position_limits(
         (plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits())

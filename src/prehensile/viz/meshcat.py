@@ -56,11 +56,11 @@ def look_at_workspace(meshcat: Meshcat) -> None:
     Args:
         meshcat: the server whose camera is set, for pages open now and later.
     """
-    meshcat.SetCameraPose(np.array([1.75, 1.05, 1.15]), np.array([0.32, 0.0, 0.2]))
+    meshcat.SetCameraPose(np.array([1.45, 0.87, 0.98]), np.array([0.32, 0.0, 0.18]))
 
 
 def _initial_properties() -> list[MeshcatParams.PropertyTuple]:
-    def prop(path: str, name: str, value: list[float] | bool) -> MeshcatParams.PropertyTuple:
+    def prop(path: str, name: str, value: list[float] | float) -> MeshcatParams.PropertyTuple:
         return MeshcatParams.PropertyTuple(path=path, property=name, value=value)
 
     return [
@@ -69,4 +69,10 @@ def _initial_properties() -> list[MeshcatParams.PropertyTuple]:
         prop("/Axes", "visible", False),
         prop("/Background/<object>", "top_color", [0.93, 0.95, 0.97]),
         prop("/Background/<object>", "bottom_color", [0.66, 0.70, 0.74]),
+        # Meshcat's own lights burn white paint out.
+        prop("/Lights/SpotLight/<object>", "intensity", 10.0),
+        prop("/Lights/PointLightNegativeX/<object>", "intensity", 6.0),
+        prop("/Lights/PointLightPositiveX/<object>", "intensity", 6.0),
+        prop("/Lights/AmbientLight/<object>", "intensity", 0.25),
+        prop("/Lights/FillLight/<object>", "intensity", 0.45),
     ]
