@@ -6,12 +6,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from prehensile.models.shapes import write_atomically
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a text file by rename."""
-    write_atomically(path, text.encode())
+from prehensile.files import write_atomic
 
 
 def write_description(
@@ -25,7 +20,7 @@ def write_description(
         "sources": list(sources),
     }
     text = yaml.safe_dump(content, sort_keys=False, width=90, allow_unicode=True)
-    write_text(folder / "model.yaml", text)
+    write_atomic(folder / "model.yaml", text)
 
 
 def write_spheres(folder: Path, spheres: Mapping[str, np.ndarray]) -> None:
@@ -35,4 +30,4 @@ def write_spheres(folder: Path, spheres: Mapping[str, np.ndarray]) -> None:
         lines.append(f"{link}:")
         for row in np.asarray(rows, dtype=float).reshape(-1, 4):
             lines.append("- [" + ", ".join(f"{v + 0.0:.5f}" for v in row) + "]")
-    write_text(folder / "spheres.yaml", "\n".join(lines) + "\n")
+    write_atomic(folder / "spheres.yaml", "\n".join(lines) + "\n")

@@ -27,7 +27,7 @@ engine has no need of, a metallic surface has nothing to reflect and looks black
 at 0.3 or below and make the colour as light as the metal. Arguments out of range raise InputError.
 """
 
-from prehensile.models.shapes.gltf import Material, Part, read_gltf, write_atomically, write_gltf
+from prehensile.models.shapes.gltf import Material, Part, read_gltf, write_gltf
 from prehensile.models.shapes.mesh import MassProperties, Mesh, merge, shade
 from prehensile.models.shapes.outlines import (
     circle,
@@ -72,6 +72,5 @@ __all__ = [
     "superellipse",
     "sweep",
     "triangulate",
-    "write_atomically",
     "write_gltf",
 ]

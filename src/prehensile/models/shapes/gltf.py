@@ -7,8 +7,6 @@ seen in Drake is what the mesh says.
 
 import base64
 import json
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from prehensile.errors import Finding, InputError
+from prehensile.files import write_atomic
 from prehensile.models.shapes import checks
 from prehensile.models.shapes.mesh import Mesh
 
@@ -73,21 +72,7 @@ def write_gltf(path: str | Path, parts: Sequence[Part]) -> None:
         raise InputError(Finding("no parts to write", file=str(path)))
     writer = _Writer()
     primitives = [writer.primitive(part) for part in parts]
-    write_atomically(Path(path), writer.document(primitives).encode())
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """Writes a file under a temporary name beside ``path`` and renames it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(temporary).chmod(0o644)  # mkstemp gives 0600
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    write_atomic(Path(path), writer.document(primitives))
 
 
 class _Writer:

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.files import write_atomic
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.furniture._parts import Block, link
 from prehensile.models.generate.sdf_model import Contact, Model, Shape, Visual, sdf_text
 from prehensile.models.generate.sphere_cover import cover_model
@@ -103,7 +104,7 @@ def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
     write_gltf(folder / "bin.gltf", visual_parts())
-    write_text(folder / "bin.sdf", sdf_text(made))
+    write_atomic(folder / "bin.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made))
     write_description(
         folder,

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from prehensile.files import write_atomic
 from prehensile.models.generate import solids
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.furniture import _carcass
 from prehensile.models.generate.furniture._parts import Block, link
 from prehensile.models.generate.sdf_model import (
@@ -151,7 +152,7 @@ def generate(folder: Path) -> None:
     write_gltf(folder / "carcass.gltf", _carcass.visual_parts())
     write_gltf(folder / "left_door.gltf", door_parts(-1))
     write_gltf(folder / "right_door.gltf", door_parts(1))
-    write_text(folder / "cupboard.sdf", sdf_text(made))
+    write_atomic(folder / "cupboard.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     heights = ", ".join(f"{z:g}" for z in _carcass.floors())
     write_description(

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.files import write_atomic
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.furniture import _carcass
 from prehensile.models.generate.furniture._parts import link
 from prehensile.models.generate.sdf_model import Model, Shape, Visual, sdf_text
@@ -23,7 +24,7 @@ def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
     write_gltf(folder / "shelves.gltf", _carcass.visual_parts())
-    write_text(folder / "shelves.sdf", sdf_text(made))
+    write_atomic(folder / "shelves.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     heights = ", ".join(f"{z:g}" for z in _carcass.floors())
     write_description(

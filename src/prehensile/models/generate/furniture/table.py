@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.files import write_atomic
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.furniture import _wood
 from prehensile.models.generate.furniture._parts import Block, link
 from prehensile.models.generate.sdf_model import Contact, Model, Shape, Visual, sdf_text
@@ -73,7 +74,7 @@ def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
     write_gltf(folder / "table.gltf", visual_parts())
-    write_text(folder / "table.sdf", sdf_text(made))
+    write_atomic(folder / "table.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.035))
     write_description(
         folder,

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.files import write_atomic
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.objects._cover import cover
 from prehensile.models.generate.sdf_model import (
     Collision,
@@ -71,7 +72,7 @@ def write_object(folder: Path, thing: HouseholdObject) -> None:
         collisions=tuple(thing.collisions),
     )
     comment = f"{thing.title}: written by python -m prehensile.models.generate {name}"
-    write_text(folder / f"{name}.sdf", sdf_text(Model(name, comment, (link,))))
+    write_atomic(folder / f"{name}.sdf", sdf_text(Model(name, comment, (link,))))
     write_description(
         folder,
         title=thing.title,

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.files import write_atomic
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.robots import _iiwa_shape
 from prehensile.models.generate.sdf_model import (
     IDENTITY,
@@ -215,7 +216,7 @@ def write(arm: Arm, folder: Path) -> None:
     heights = [upper.pose[2] - lower.pose[2] for lower, upper in pairwise(arm.axes)]
     for i, parts in enumerate(_iiwa_shape.links(heights, arm.drum, arm.flange)):
         write_gltf(folder / f"link_{i}.gltf", parts)
-    write_text(folder / f"{arm.name}.sdf", sdf_text(made))
+    write_atomic(folder / f"{arm.name}.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.036))
     write_description(
         folder,

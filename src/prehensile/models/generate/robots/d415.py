@@ -7,8 +7,9 @@ front, y to the left, z up. Optical frames have z to the front, x to the right, 
 from math import pi
 from pathlib import Path
 
+from prehensile.files import write_atomic
 from prehensile.models.generate import solids
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.sdf_model import (
     Collision,
     Contact,
@@ -89,7 +90,7 @@ def generate(folder: Path) -> None:
     """Writes the model."""
     made = model()
     write_gltf(folder / "body.gltf", parts())
-    write_text(folder / "d415.sdf", sdf_text(made))
+    write_atomic(folder / "d415.sdf", sdf_text(made))
     write_spheres(folder, cover_model(made, bulge=0.01))
     write_description(
         folder,

@@ -8,8 +8,9 @@ plane x = 0 when closed: the opening is the distance between them.
 
 from pathlib import Path
 
+from prehensile.files import write_atomic
 from prehensile.models.generate import solids
-from prehensile.models.generate.files import write_description, write_spheres, write_text
+from prehensile.models.generate.files import write_description, write_spheres
 from prehensile.models.generate.robots._wsg50_shape import (
     BODY_SIZE,
     FINGER_TIP,
@@ -118,8 +119,8 @@ def generate(folder: Path) -> None:
     made = model()
     write_gltf(folder / "body.gltf", body_parts())
     write_gltf(folder / "finger.gltf", finger_parts())
-    write_text(folder / "pad.vtk", pad_mesh())
-    write_text(folder / "wsg50.sdf", sdf_text(made))
+    write_atomic(folder / "pad.vtk", pad_mesh())
+    write_atomic(folder / "wsg50.sdf", sdf_text(made))
     write_spheres(folder, cover_model(model(PAD_BOX), bulge=0.016))
     write_description(
         folder,
