@@ -336,7 +336,7 @@ def test_drivers_that_do_not_fit(scenario):
 
 def test_no_camera_costs_nothing(scenario):
     station = build(dc.replace(scenario, cameras={}))
-    assert not station.HasSubsystemNamed("camera_scene_graph")
+    assert not station.HasSubsystemNamed("cameras")
     assert station.scene_graph().RendererCount() == 0
 
 

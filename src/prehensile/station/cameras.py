@@ -7,10 +7,13 @@ x right and y down in the image), which is that of its depth sensor.
 import os
 import warnings
 from copy import deepcopy
+from functools import partial
 from typing import NoReturn
 
 from pydrake.common.schema import Transform
+from pydrake.common.value import AbstractValue
 from pydrake.geometry import (
+    FramePoseVector,
     MakeRenderEngineGl,
     MakeRenderEngineGltfClient,
     MakeRenderEngineVtk,
@@ -26,7 +29,13 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.perception import BaseField, DepthImageToPointCloud
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
 from pydrake.systems.sensors import CameraConfig, PixelType, RgbdSensor
 
 from prehensile.errors import Finding, InputError
@@ -104,25 +113,72 @@ def add_cameras(
     """
     if not scenario.cameras:
         return
-    # A scene graph moves the geometry of its renderers whenever anything asks it anything, at
-    # every step that is. A copy of it, asked by the cameras alone, leaves that until they look.
-    visible = builder.AddNamedSystem("camera_scene_graph", scene_graph.Clone())
+    inside = DiagramBuilder()
+    visible = inside.AddNamedSystem("scene_graph", scene_graph.Clone())
     source = plant.get_source_id()
     for geometry in visible.model_inspector().GetAllGeometryIds(Role.kProximity):
         visible.RemoveRole(source, geometry, Role.kProximity)
-    builder.Connect(plant.get_geometry_pose_output_port(), visible.get_source_pose_port(source))
+    inside.ExportInput(visible.get_source_pose_port(source), "geometry_pose")
     for key, config in scenario.cameras.items():
         if not visible.HasRenderer(config.renderer_name):
             visible.AddRenderer(config.renderer_name, _make_renderer(scenario, key))
-        sensor = add_sensor(scenario, key, builder, plant, visible)
+        sensor = add_sensor(scenario, key, inside, plant, visible)
         add_camera_ports(
-            builder,
+            inside,
             config,
             rgb=sensor.color_image_output_port(),
             depth=sensor.depth_image_32F_output_port(),
             label=sensor.label_image_output_port(),
             pose=sensor.body_pose_in_world_output_port(),
         )
+    cameras = builder.AddNamedSystem("cameras", Cameras(inside.Build()))
+    builder.Connect(plant.get_geometry_pose_output_port(), cameras.get_input_port())
+    for i in range(cameras.num_output_ports()):
+        port = cameras.get_output_port(i)
+        builder.ExportOutput(port, port.get_name())
+
+
+class Cameras(LeafSystem):
+    """All cameras of a station, shut off from the simulation until one is read.
+
+    A scene graph moves the geometry of its renderers whenever anything asks it anything, and each
+    system adds to the cost of every step. So the cameras have a scene graph of their own, and all
+    of it is in a diagram that the simulator does not see.
+
+    Its input port is ``geometry_pose``, the plant's; its output ports are those of the diagram.
+
+    Args:
+        inside: scene graph, sensors and converters; one input port, for the poses.
+    """
+
+    def __init__(self, inside: Diagram) -> None:
+        super().__init__()
+        self._inside, self._context = inside, inside.CreateDefaultContext()
+        scene_graph = inside.GetSubsystemByName("scene_graph")
+        assert isinstance(scene_graph, SceneGraph)
+        frames = scene_graph.model_inspector().GetAllFrameIds()
+        self._frames = [frame for frame in frames if frame != scene_graph.world_frame_id()]
+        self._key = b""
+        self._poses = self.DeclareAbstractInputPort(
+            "geometry_pose", inside.get_input_port().Allocate()
+        )
+        for i in range(inside.num_output_ports()):
+            port = inside.get_output_port(i)
+            self.DeclareAbstractOutputPort(
+                port.get_name(),
+                port.Allocate,
+                partial(self._calc, port),
+                prerequisites_of_calc={self._poses.ticket()},
+            )
+
+    def _calc(self, port: OutputPort, context: Context, value: AbstractValue) -> None:
+        poses: FramePoseVector = self._poses.Eval(context)
+        matrices = (poses.value(frame).GetAsMatrix34() for frame in self._frames)
+        key = b"".join(matrix.tobytes() for matrix in matrices)
+        if key != self._key:
+            self._inside.get_input_port().FixValue(self._context, AbstractValue.Make(poses))
+            self._key = key
+        value.set_value(port.Eval(self._context))
 
 
 def add_sensor(

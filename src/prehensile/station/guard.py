@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Context, DiscreteValues, InputPort, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from prehensile.errors import Finding, InputError
 
@@ -299,10 +299,10 @@ class _Group:
     period: float
     timeout: float
     start: np.ndarray
-    command: InputPort
-    effort: InputPort
-    time: InputPort
-    measured: InputPort
+    command: int
+    effort: int
+    time: int
+    measured: int
     positions: int
     efforts: int
     status: int
@@ -367,41 +367,43 @@ class JointGuard(LeafSystem):
             period=period,
             timeout=timeout,
             start=start,
-            command=self.DeclareVectorInputPort(f"{model}.position", n),
-            effort=self.DeclareVectorInputPort(f"{model}.effort", n),
-            time=self.DeclareVectorInputPort(f"{model}.command_time", 1),
-            measured=self.DeclareVectorInputPort(f"{model}.measured", measured_size or n),
+            command=int(self.DeclareVectorInputPort(f"{model}.position", n).get_index()),
+            effort=int(self.DeclareVectorInputPort(f"{model}.effort", n).get_index()),
+            time=int(self.DeclareVectorInputPort(f"{model}.command_time", 1).get_index()),
+            measured=int(
+                self.DeclareVectorInputPort(f"{model}.measured", measured_size or n).get_index()
+            ),
             positions=int(position),
             efforts=int(effort),
             status=int(status),
             memory=int(memory),
             rest=np.array([0.0] * n + [_SETTLED]).tobytes(),
         )
-        self.DeclareInitializationDiscreteUpdateEvent(partial(_initialize, group))
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, partial(_update, group))
+        self.DeclareInitializationDiscreteUpdateEvent(partial(_initialize, group, self))
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, partial(_update, group, self))
 
 
-def _initialize(group: _Group, context: Context, values: DiscreteValues) -> None:
+def _initialize(group: _Group, guard: LeafSystem, context: Context, values: DiscreteValues) -> None:
     """Holds the joints where they are."""
     q = group.start
-    if group.measured.HasValue(context):
-        measured = group.measured.Eval(context)[: group.limits.size]
-        if np.isfinite(measured).all():
-            q = measured
+    measured = guard.EvalVectorInput(context, group.measured)
+    if measured is not None and np.isfinite(measured.value()).all():
+        q = measured.value()[: group.limits.size]
     values.set_value(group.positions, q)
     values.set_value(group.efforts, group.limits.effort_default)
     values.set_value(group.status, [float(GuardStatus.UNCONNECTED)])
     values.set_value(group.memory, np.concatenate([q, np.zeros(len(q) + 1)]))
 
 
-def _update(group: _Group, context: Context, values: DiscreteValues) -> None:
+def _update(group: _Group, guard: LeafSystem, context: Context, values: DiscreteValues) -> None:
     # The one place where Python runs in an idle station, hence the short way out for it.
-    command = group.command.Eval(context) if group.command.HasValue(context) else None
-    has_effort = group.effort.HasValue(context)
-    stamp = group.time.Eval(context)[0] if group.time.HasValue(context) else None
-    fresh = stamp is None or context.get_time() - stamp <= group.timeout
+    command = guard.EvalVectorInput(context, group.command)
+    command = None if command is None else command.value()
+    effort = guard.EvalVectorInput(context, group.effort)
+    stamp = guard.EvalVectorInput(context, group.time)
+    fresh = stamp is None or context.get_time() - stamp[0] <= group.timeout
     memory = values.value(group.memory)
-    if fresh and not has_effort:
+    if fresh and effort is None:
         if command is None:
             if memory[-1] == _WAITING:
                 return
@@ -418,7 +420,7 @@ def _update(group: _Group, context: Context, values: DiscreteValues) -> None:
     state = guard_step(
         state,
         None if command is None else command.tolist(),
-        group.effort.Eval(context).tolist() if has_effort else None,
+        None if effort is None else effort.value().tolist(),
         group.limits,
         group.period,
         fresh=fresh,
