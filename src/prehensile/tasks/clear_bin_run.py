@@ -72,7 +72,7 @@ class ClearBinRun:
         """
         scenario = scenario or load_scenario("two_bins")
         world = make_robot_diagram(scenario)
-        pick_bin, self._place_bin = (_bin_geometry(world, name) for name in ("bin0", "bin1"))
+        pick_bin, self._place_bin = (bin_geometry(world, name) for name in ("bin0", "bin1"))
         self._pick_bin = pick_bin
         self.objects = drop_into_bin(
             models,
@@ -196,7 +196,7 @@ def intrinsics(config: CameraConfig) -> np.ndarray:
     return depth_camera.core().intrinsics().intrinsic_matrix()
 
 
-def _bin_geometry(world: RobotDiagram, name: str) -> BinGeometry:
+def bin_geometry(world: RobotDiagram, name: str) -> BinGeometry:
     """Pose, interior, floor and walls of one of the station's bins."""
     plant, inspector = world.plant(), world.scene_graph().model_inspector()
     body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName(name))
