@@ -70,8 +70,10 @@ def test_frames_are_rotations_that_start_from_the_seeds_normal() -> None:
         np.swapaxes(R, 1, 2) @ R, np.tile(np.eye(3), (len(R), 1, 1)), atol=1e-12
     )
     np.testing.assert_allclose(np.linalg.det(R), 1.0, atol=1e-12)
-    # Every closing axis is the normal of a point of the cloud.
-    distance, _ = KDTree(cloud.normals).query(R[:, :, 0])
+    # Every closing axis is the normal of a point of the cloud, or the level part of one.
+    level = cloud.normals[np.abs(cloud.normals[:, 2]) < 0.99] * [1.0, 1.0, 0.0]
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    distance, _ = KDTree(np.concatenate([cloud.normals, level])).query(R[:, :, 0])
     assert distance.max() < 1e-9
     # No approach is further from straight down than allowed; every seed has its steepest one.
     tilt = np.arccos(np.clip(-R[:, 2, 1], -1, 1))
@@ -197,13 +199,13 @@ def empty() -> Cloud:
 
 
 def wedge() -> Cloud:
-    """A ridge of two faces that lean inward by 22 degrees each, without the rest of the solid."""
-    lean = np.deg2rad(22)
-    u, v = np.meshgrid(np.arange(0, 0.1, 0.001), np.arange(-0.05, 0.05, 0.001))
+    """A ridge of two faces that lean inward by 40 degrees each, down to the floor."""
+    lean = np.deg2rad(40)
+    u, v = np.meshgrid(np.arange(0, 0.155, 0.001), np.arange(-0.05, 0.05, 0.001))
     u, v = u.ravel(), v.ravel()
     clouds = []
     for s in (-1.0, 1.0):
-        p = np.column_stack([s * u * np.sin(lean), v, 0.1 - u * np.cos(lean)])
+        p = np.column_stack([s * u * np.sin(lean), v, 0.12 - u * np.cos(lean)])
         normal = [s * np.cos(lean), 0.0, np.sin(lean)]
         clouds.append(Cloud(p, np.tile(normal, (len(p), 1))))
     return downsample(joined(clouds), VOXEL)

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from prehensile.grasping.grasp import GraspConfig
 from prehensile.perception.cloud import Cloud
 
+# Normals that lean no more than this count as level [rad].
+_LEVEL = np.deg2rad(8)
+
 
 @dataclass(frozen=True)
 class Candidates:
@@ -40,13 +43,14 @@ def antipodal_candidates(
     rng: np.random.Generator,
     config: GraspConfig,
 ) -> Candidates:
-    """Candidates whose closing axis is the normal of a sampled point.
+    """Candidates whose closing axis is the normal of a sampled point, or its level part.
 
-    For each seed point the closing axis x is its outward normal, the approach y is turned about x
-    in steps from the steepest direction, and the pads' centre is put at several depths past the
-    point (Tedrake, Robotic Manipulation, section 5.4.4). Points whose normal is so steep that no
-    approach perpendicular to it stays within ``max_tilt`` of straight down are no seeds. Seeds
-    are spread over the segments with the root of their sizes, so that small things are not
+    For each seed point the closing axis x is its outward normal, and, if that leans, its level
+    part too (what a camera sees of a round thing on the floor leans upward); the approach y is
+    turned about x in steps from the steepest direction; the pads' centre is put at several depths
+    past the point (Tedrake, Robotic Manipulation, section 5.4.4). Points whose normal is so steep
+    that no approach perpendicular to it stays within ``max_tilt`` of straight down are no seeds.
+    Seeds are spread over the segments with the root of their sizes, so that small things are not
     forgotten.
 
     Args:
@@ -71,7 +75,12 @@ def antipodal_candidates(
         replace=False,
         p=weight / weight.sum(),
     )
-    R_W0 = _steepest_frames(cloud.normals[seeds])
+    axes = cloud.normals[seeds]
+    leaning = np.abs(axes[:, 2]) > np.sin(_LEVEL)
+    order = np.argsort(np.append(np.arange(len(seeds)), np.nonzero(leaning)[0]), kind="stable")
+    seeds = np.concatenate([seeds, seeds[leaning]])[order]
+    axes = np.concatenate([axes, axes[leaning] * [1.0, 1.0, 0.0]])[order]
+    R_W0 = _steepest_frames(axes)
     steps = int(config.max_tilt / config.tilt_step)
     angles = config.tilt_step * np.arange(-steps, steps + 1)
     depths = np.array(config.depths)

@@ -37,9 +37,9 @@ class GraspConfig:
     # Length of the straight approach that must be free of obstacles [m]; 0 or more.
     approach: float = 0.08
     # Points within this of the first touched one count as contact [m]; above 0.
-    contact_depth: float = 0.006
+    contact_depth: float = 0.004
     # Largest angle between a pad's normal and the mean contact normal [rad]; 0 to pi/2.
-    max_contact_angle: float = float(np.deg2rad(30))
+    max_contact_angle: float = float(np.deg2rad(35))
     # Quality (0 to 1) ascribed to a side of the object that no camera saw.
     unseen_side: float = 0.25
     # Weights of the penalties, each against a contact quality of 0 to 1; 0 or more:

@@ -209,14 +209,17 @@ def _evaluate_columns(
     beside = np.sum(R[k, :, 1] * normals, axis=1) > -_FACES_PALM
     with np.errstate(invalid="ignore"):
         middle = 0.5 * (low + high)
-    # The pads close evenly, so the hand is centred on what they will touch; a side that no camera
-    # saw is taken to be where the column ends.
-    touch, seen, side = {}, {}, {}
+    # The pads close evenly, so the hand is centred on what they will touch. A side that no camera
+    # saw is taken to be where the column ends, if it ends above the middle of the pads, and does
+    # not merely sink below their reach.
+    touch, seen, side, ends = {}, {}, {}, np.ones(m, dtype=bool)
     for sign, end in ((-1, -low), (1, high)):
         side[sign] = beside & (sign * normal_x > -0.5) & (sign * (x_pad - middle[k]) > 0)
         reached = largest(k[side[sign]], sign * x_pad[side[sign]], m)
         seen[sign] = np.isfinite(reached)
         touch[sign] = np.where(seen[sign], reached, end)
+        at_end = between & (sign * x >= end[i] - config.contact_depth)
+        ends &= seen[sign] | (largest(i[at_end], -y[at_end], m) >= 0.0)
     with np.errstate(invalid="ignore"):
         centre = 0.5 * (touch[1] - touch[-1])
         span = touch[1] + touch[-1]
@@ -251,7 +254,7 @@ def _evaluate_columns(
     length = np.linalg.norm(contact_axis, axis=1, keepdims=True)
     out.contact_axis[rows] = contact_axis / np.maximum(length, 1e-12)
     both, one = seen[-1] & seen[1], seen[-1] | seen[1]
-    antipodal = square & (both | (one & (span > _MIN_UNSEEN_SPAN)))
+    antipodal = square & ends & (both | (one & (span > _MIN_UNSEEN_SPAN)))
 
     # Later lines take precedence.
     status = np.full(m, GraspStatus.FOUND, dtype=object)
