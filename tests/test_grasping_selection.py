@@ -233,6 +233,17 @@ def test_the_result_says_why_there_is_no_grasp(cloud: Cloud, status: GraspStatus
     assert result.grasps == ()
 
 
+def test_specks_that_belong_to_no_segment_do_no_harm() -> None:
+    cloud = box_cloud([0.04, 0.04, 0.05], RigidTransform([0, 0, 0.025]))
+    speck = cloud.select(np.arange(8))
+    assert (convex_segments(speck, VOXEL) == -1).all()
+    select(speck)
+    nothing = np.full(len(cloud), -1)
+    assert select_grasps(
+        cloud, WSG50, [FLOOR], GraspConfig(), np.random.default_rng(0), segments=nothing
+    ).success
+
+
 def test_the_same_seed_gives_the_same_grasps() -> None:
     a, b, c = (select(clutter(2), seed=seed) for seed in (5, 5, 6))
     assert [g.score for g in a.grasps] == [g.score for g in b.grasps]

@@ -270,7 +270,7 @@ def _evaluate_columns(
     other = np.bincount(k, segments[n_pad] != label[k], m)
     arm, burden = np.zeros(m), np.zeros(m)
     known = label >= 0
-    arm[known] = np.linalg.norm((out.p_WP[rows] - centres[label])[known, :2], axis=1)
+    arm[known] = np.linalg.norm((out.p_WP[rows[known]] - centres[label[known]])[:, :2], axis=1)
     burden[known] = burdens[label[known]]
     terms = {
         "contact": quality,
