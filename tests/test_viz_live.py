@@ -144,6 +144,17 @@ _TWO_JOINTS = """<robot name="bot">
 </robot>"""
 
 
+def test_joints_of_two_equal_models_have_two_names() -> None:
+    builder = RobotDiagramBuilder()
+    builder.parser().SetAutoRenaming(True)
+    for _ in range(2):
+        builder.parser().AddModelsFromString(_TWO_JOINTS, "urdf")
+    builder.plant().Finalize()
+    q = builder.plant().GetPositions(builder.plant().CreateDefaultContext())
+    names = [slider.name for _, slider in joint_sliders(builder.plant(), q)]
+    assert names == ["bot turn", "bot slide", "bot_1 turn", "bot_1 slide"]
+
+
 def test_viewer_moves_joints_until_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     meshcat = start_meshcat()
     builder = RobotDiagramBuilder()
@@ -153,7 +164,7 @@ def test_viewer_moves_joints_until_stopped(monkeypatch: pytest.MonkeyPatch) -> N
     plant.Finalize()
     diagram = builder.Build()
     joints = joint_sliders(plant, np.zeros(2))
-    assert [s.name for _, s in joints] == ["bot turn", "bot slide"]
+    assert [s.name for _, s in joints] == ["turn", "slide"]
     assert (joints[1][1].lower, joints[1][1].upper) == (-0.1, 0.3)
     assert joints[0][1].upper == pytest.approx(np.pi)
 
@@ -164,7 +175,7 @@ def test_viewer_moves_joints_until_stopped(monkeypatch: pytest.MonkeyPatch) -> N
         nonlocal naps
         naps += 1
         if naps == 2:
-            meshcat.SetSliderValue("bot slide", 9.0)
+            meshcat.SetSliderValue("slide", 9.0)
         elif naps == 4:
             press(meshcat, STOP_BUTTON)
 

@@ -140,14 +140,15 @@ rect.opens:hover { stroke-width: 3; }
 <div id="bar">
   <span id="trail"></span>
   <span id="depths"></span>
-  <span><button id="smaller">&minus;</button> <button id="larger">+</button></span>
+  <span><button id="smaller">&minus;</button> <button id="larger">+</button>
+    <button id="fit">fit</button></span>
   <span class="hint">click a yellow block to step in; hover a signal to see it</span>
 </div>
 <div id="picture"></div>
 <script>
 const pictures = @DATA@;
 const root = Object.keys(pictures)[0];
-let path = root, depth = @DEPTH@, zoom = 1;
+let path = root, depth = @DEPTH@, zoom = 0;  // 0: as large as fits, at most 1
 
 function button(text, on, action) {
   const b = document.createElement("button");
@@ -175,15 +176,18 @@ function show() {
   const pane = document.getElementById("picture");
   pane.innerHTML = pictures[path][shown - 1];
   const svg = pane.firstElementChild;
-  svg.setAttribute("width", svg.viewBox.baseVal.width * zoom);
-  svg.setAttribute("height", svg.viewBox.baseVal.height * zoom);
+  const fit = Math.min(1, pane.clientWidth / svg.viewBox.baseVal.width);
+  const scale = zoom || fit;
+  document.getElementById("larger").onclick = () => { zoom = scale * 1.25; show(); };
+  document.getElementById("smaller").onclick = () => { zoom = scale / 1.25; show(); };
+  svg.setAttribute("width", svg.viewBox.baseVal.width * scale);
+  svg.setAttribute("height", svg.viewBox.baseVal.height * scale);
   for (const rect of pane.querySelectorAll("rect.opens")) {
     rect.onclick = () => { path = rect.dataset.path; show(); };
   }
 }
 
-document.getElementById("larger").onclick = () => { zoom *= 1.25; show(); };
-document.getElementById("smaller").onclick = () => { zoom /= 1.25; show(); };
+document.getElementById("fit").onclick = () => { zoom = 0; show(); };
 show();
 </script>
 </body>

@@ -16,6 +16,7 @@ from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from prehensile.errors import Finding, InputError
 from prehensile.files import write_atomic
+from prehensile.viz.progress import progress
 
 # A power of two: the frame number of a transform is floor(time * rate), and multiples of 1/32 s
 # (and of 1/64 s, at which Drake's visualizer publishes) fall on frames without rounding.
@@ -129,7 +130,10 @@ class Recorder:
         check_writable(path)
         self.stop()
         self._meshcat.PublishRecording()
-        write_atomic(path, pack_page(self._meshcat.StaticHtml()))
+        with progress(f"writing {path.name}") as report:
+            page = pack_page(self._meshcat.StaticHtml())
+            write_atomic(path, page)
+            report(1, f"{len(page) / 1e6:.1f} MB")
         return path
 
     def __enter__(self) -> Self:

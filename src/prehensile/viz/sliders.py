@@ -1,5 +1,6 @@
 """Sliders of the Meshcat page: declared in Python, moved in the browser, read as an array."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -83,19 +84,21 @@ def joint_sliders(
         positions: (num_positions,) where the sliders start.
 
     Returns:
-        Joints and their sliders in the plant's order. The label is "model joint"; joints without
-        limits get one turn, or half a metre, to each side.
+        Joints and their sliders in the plant's order. The label is the joint's name, after the
+        model's where two share it; joints without limits get half a turn, or half a metre, to
+        each side.
     """
+    joints = [plant.get_joint(JointIndex(index)) for index in plant.GetJointIndices()]
+    joints = [joint for joint in joints if joint.num_positions() == 1]
+    count = Counter(joint.name() for joint in joints)
     found = []
-    for index in plant.GetJointIndices():
-        joint = plant.get_joint(JointIndex(index))
-        if joint.num_positions() != 1:
-            continue
+    for joint in joints:
         value = float(positions[joint.position_start()])
         wide = 0.5 if joint.type_name() == PrismaticJoint.kTypeName else np.pi
         lower, upper = joint.position_lower_limit(), joint.position_upper_limit()
         lower = lower if np.isfinite(lower) else value - wide
         upper = upper if np.isfinite(upper) else value + wide
-        name = f"{plant.GetModelInstanceName(joint.model_instance())} {joint.name()}"
+        model = plant.GetModelInstanceName(joint.model_instance())
+        name = joint.name() if count[joint.name()] == 1 else f"{model} {joint.name()}"
         found.append((joint, Slider(name, lower, upper, 1e-3, value)))
     return found

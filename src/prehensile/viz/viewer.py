@@ -20,8 +20,8 @@ _SPHERES = "spheres"
 _SPHERE_COLOR = Rgba(0.15, 0.5, 0.9, 0.45)
 # Button, key, Meshcat path, shown at first.
 _LAYERS = (
-    ("Show or hide visual geometry", "KeyV", "illustration", True),
-    ("Show or hide collision geometry", "KeyC", "proximity", False),
+    ("Visual geometry (V)", "KeyV", "illustration", True),
+    ("Collision geometry (C)", "KeyC", "proximity", False),
 )
 
 
@@ -67,7 +67,7 @@ def view(
     q = plant.GetPositions(plant_context)
     joints = joint_sliders(plant, q)
     sliders = [slider for _, slider in joints]
-    layers = [*_LAYERS, *([("Show or hide spheres", "KeyX", _SPHERES, True)] if spheres else [])]
+    layers = [*_LAYERS, *([("Spheres (X)", "KeyX", _SPHERES, True)] if spheres else [])]
     diagram.ExecuteInitializationEvents(context)
     draw_spheres(meshcat, plant, spheres or {})
     add_sliders(meshcat, sliders)
