@@ -34,13 +34,13 @@ def test_bin_has_the_interior_that_it_says() -> None:
     def distance(x: float, y: float, z: float) -> float:
         return made.distance("base_link", np.array([x, y, z]))
 
-    for z in (0.05, 0.16):
-        assert distance(0.23, 0.0, z) == pytest.approx(min(0.05, z - 0.01), abs=1e-9)
+    for z in (0.07, 0.18):
+        assert distance(0.23, 0.0, z) == pytest.approx(min(0.05, z - 0.03), abs=1e-9)
         assert distance(-0.25, 0.0, z) == pytest.approx(0.03, abs=1e-9)
         assert distance(0.0, 0.16, z) == pytest.approx(0.03, abs=1e-9)
         assert distance(0.0, -0.16, z) == pytest.approx(0.03, abs=1e-9)
-    assert distance(0.0, 0.0, 0.05) == pytest.approx(0.04, abs=1e-9)  # floor at 0.01
-    assert distance(0.3, 0.0, 0.27) == pytest.approx(0.10, abs=1e-9)  # walls up to 0.17
+    assert distance(0.0, 0.0, 0.05) == pytest.approx(0.02, abs=1e-9)  # floor at 0.03
+    assert distance(0.3, 0.0, 0.27) == pytest.approx(0.08, abs=1e-9)  # walls up to 0.19
     assert distance(0.295, 0.205, -0.02) == pytest.approx(0.02, abs=1e-9)  # stands at 0
     assert distance(0.29, 0.0, 0.1) < 0.0  # walls are thick
 

@@ -36,7 +36,7 @@ def test_every_camera_over_the_bins_has_the_whole_interior_of_bin0_in_its_pictur
     assert config.X_PB.base_frame == f"{camera}::color_optical_frame"
     X_CW = pose(plant, camera, "color_optical_frame").inverse()
     X_WB = pose(plant, "bin0", "base_link")
-    corners_B = np.array(list(itertools.product((-0.28, 0.28), (-0.19, 0.19), (0.01, 0.17))))
+    corners_B = np.array(list(itertools.product((-0.28, 0.28), (-0.19, 0.19), (0.03, 0.19))))
     x, y, z = X_CW @ (X_WB @ corners_B.T)
     assert (z > config.z_near).all()
     assert (z < config.z_far).all()

@@ -19,8 +19,8 @@ from prehensile.errors import Finding, InputError
 from prehensile.models.registry import find_model, package_map
 
 # Interior of the embedded `bin`, expressed in its frame B: the box that objects must stay in.
-BIN_INTERIOR_MIN = np.array([-0.28, -0.19, 0.01])
-BIN_INTERIOR_MAX = np.array([0.28, 0.19, 0.17])
+BIN_INTERIOR_MIN = np.array([-0.28, -0.19, 0.03])
+BIN_INTERIOR_MAX = np.array([0.28, 0.19, 0.19])
 
 
 @dataclass(frozen=True)
