@@ -10,10 +10,10 @@ Images are taken from Drake's camera channel, ``DRAKE_RGBD_CAMERA_IMAGES_NAME``,
 import numpy as np
 from drake import lcmt_image_array
 from pydrake.geometry import Meshcat, SceneGraph
-from pydrake.lcm import DrakeLcmInterface
+from pydrake.lcm import DrakeLcm, DrakeLcmInterface
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
-from pydrake.systems.lcm import ApplyLcmBusConfig, LcmBuses, LcmSubscriberSystem
+from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem, LcmSubscriberSystem
 from pydrake.systems.primitives import AffineSystem, ConstantVectorSource, Multiplexer
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from pydrake.systems.sensors import LcmImageArrayToImages
@@ -54,7 +54,12 @@ def build_interface(
     add_part(scenario, plant, fixed_models(scenario))
     plant.Finalize()
     if lcm_buses is None:
-        lcm_buses = ApplyLcmBusConfig(lcm_buses=scenario.lcm_buses, builder=builder)
+        # By hand: a subscriber on a bus that ApplyLcmBusConfig made crashes with Drake 1.58.
+        lcm_buses = LcmBuses()
+        for name, params in scenario.lcm_buses.items():
+            lcm = DrakeLcm(params)
+            builder.AddNamedSystem(f"lcm.{name}", LcmInterfaceSystem(lcm))
+            lcm_buses.Add(name, lcm)
 
     measured: list[OutputPort] = []
     gains: list[np.ndarray] = []
