@@ -1,7 +1,8 @@
 """The motions of clearing a bin that planning alone does not know: the drop and the nudge."""
 
 import dataclasses as dc
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from pydrake import geometry
@@ -197,10 +198,10 @@ def plan_nudge(
         if plan.approach is None or plan.X_WG is None:
             continue
         X_WEnd = RigidTransform(min(distance, _DRAG) * inward) @ plan.X_WG
-        drag = plan_cartesian(arm, plan.approach.q_end, X_WEnd)
-        if not drag.found:
-            continue
-        rise = plan_cartesian(arm, drag.path[-1], RigidTransform([0.0, 0.0, lift_height]) @ X_WEnd)
+        X_WUp = RigidTransform([0.0, 0.0, lift_height]) @ X_WEnd
+        with _touching(arm):
+            drag = plan_cartesian(arm, plan.approach.q_end, X_WEnd)
+            rise = plan_cartesian(arm, drag.path[-1], X_WUp) if drag.found else drag
         if rise.found:
             return NudgePlan(
                 plan.approach,
@@ -208,3 +209,14 @@ def plan_nudge(
                 time_parameterize(rise.path, arm.limits, speed=0.5),
             )
     return None
+
+
+@contextmanager
+def _touching(arm: ArmModel) -> Iterator[None]:
+    """What was seen may be touched for a while."""
+    heights = arm.heights
+    arm.set_heights(None)
+    try:
+        yield
+    finally:
+        arm.set_heights(heights)
