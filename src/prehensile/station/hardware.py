@@ -55,11 +55,12 @@ def build_interface(
     plant.Finalize()
     if lcm_buses is None:
         # By hand: a subscriber on a bus that ApplyLcmBusConfig made crashes with Drake 1.58.
-        lcm_buses = LcmBuses()
+        buses = LcmBuses()
         for name, params in scenario.lcm_buses.items():
             lcm = DrakeLcm(params)
             builder.AddNamedSystem(f"lcm.{name}", LcmInterfaceSystem(lcm))
-            lcm_buses.Add(name, lcm)
+            buses.Add(name, lcm)
+        lcm_buses = buses
 
     measured: list[OutputPort] = []
     gains: list[np.ndarray] = []
