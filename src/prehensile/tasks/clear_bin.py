@@ -47,7 +47,7 @@ class ClearBinConfig:
     # Points left in the bin below which it counts as empty; 1 or more.
     min_points: int = 40
     # Failures in a row after which the task gives up; 1 or more.
-    max_failures: int = 6
+    max_failures: int = 8
     # Attempts in all after which the task gives up; 1 or more.
     max_attempts: int = 60
     # Straight line into the grasp [m]; above 0.

@@ -18,8 +18,8 @@ from prehensile.planning.trajectory import TimedPath, time_parameterize
 # What is carried swings on its two contacts, the more the harder it is shaken.
 _CARRY = MoveOptions(carry_speed=0.7, carry_acceleration=0.35)
 _RIM_CLEARANCE = 0.02  # m between the finger tips and the rim of the second bin
-_PRESS = 0.012  # m that a nudge is commanded into a surface; the arm yields
-_DRAG = 0.09  # m that a nudge drags
+_PRESS = 0.022  # m that a nudge is commanded into a surface; the arm yields
+_DRAG = 0.15  # m that a nudge drags
 _DRAG_SPEED = 0.15  # share of the joint velocity limits
 
 
@@ -175,9 +175,14 @@ def plan_nudge(
     Returns:
         The plan; None if no piece can be reached.
     """
-    pieces = np.unique(segments[segments >= 0])
-    for piece in rng.permutation(pieces)[:4]:
-        top = (segments == piece) & (cloud.normals[:, 2] > 0.8)
+    upward = (segments >= 0) & (cloud.normals[:, 2] > 0.8)
+    pieces, areas = np.unique(segments[upward], return_counts=True)
+    if len(pieces) == 0:
+        return None
+    # Mostly the large ones: they cover the others.
+    order = rng.choice(pieces, len(pieces), replace=False, p=areas / areas.sum())
+    for piece in order[:4]:
+        top = upward & (segments == piece)
         if np.count_nonzero(top) < 10:
             continue
         p_WTop = np.median(cloud.points[top], axis=0)
