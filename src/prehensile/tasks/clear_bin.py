@@ -91,6 +91,7 @@ class Memory:
         pick: the one under way.
         failures: number of failures in a row.
         failed: where grasps failed since the last success, p_WG.
+        drops: where things were let go over the second bin, p_WG.
         finished: why the task ended ("" while it goes on).
     """
 
@@ -99,6 +100,7 @@ class Memory:
     pick: Pick | None = None
     failures: int = 0
     failed: tuple[np.ndarray, ...] = ()
+    drops: tuple[np.ndarray, ...] = ()
     finished: str = ""
 
 
@@ -170,7 +172,10 @@ class ClearBin:
             return self._retreat(memory, pick, lifted=True)
         if state == "carry":
             return Decision("release", memory, self._open(memory.q, self.config.open_time))
-        return self._next(_settle(memory, pick.attempt, time, "moved", ""))  # release
+        # Released.
+        memory = _settle(memory, pick.attempt, time, "moved", "")
+        p_WG = self._arm.pose(memory.q).translation()
+        return self._next(dc.replace(memory, drops=(*memory.drops, p_WG)))
 
     def _move(self, state: str, memory: Memory, motion: TimedPath) -> Decision:
         """Moves with the hand closed."""
@@ -245,6 +250,7 @@ class ClearBin:
             self._place_bin,
             self._gripper,
             config.drop_height,
+            memory.drops,
             rng,
         )
         if place.carry is None:

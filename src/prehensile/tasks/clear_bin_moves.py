@@ -18,6 +18,7 @@ from prehensile.planning.trajectory import TimedPath, time_parameterize
 # What is carried swings on its two contacts, the more the harder it is shaken.
 _CARRY = MoveOptions(carry_speed=0.7, carry_acceleration=0.35)
 _RIM_CLEARANCE = 0.02  # m between the finger tips and the rim of the second bin
+_DROP_INSET = 0.11  # m from the walls of the second bin to where things are let go
 _PRESS = 0.022  # m that a nudge is commanded into a surface; the arm yields
 _DRAG = 0.15  # m that a nudge drags
 _DRAG_SPEED = 0.15  # share of the joint velocity limits
@@ -102,6 +103,7 @@ def plan_drop(
     place: BinGeometry,
     gripper: ParallelGripper,
     drop_height: float,
+    used: Sequence[np.ndarray],
     rng: np.random.Generator,
 ) -> PlacePlan:
     """Carries what is held over a bin, clear of everything on the way.
@@ -113,25 +115,28 @@ def plan_drop(
         place: the bin to fill.
         gripper: the hand.
         drop_height: height above the bin's floor at which the lowest point is let go [m].
+        used: where things were let go before, p_WG; the places farthest from them come first.
         rng: of the places and of the search.
 
     Returns:
         The plan; the hand stays above the rim, for the bin may be full by now.
     """
-    low = held.X_WB.translation()[1] + 0.5 * held.size[1]  # lowest point of what is held, along y
-    hang = low - gripper.pad_y[1]
+    hang = held.X_WB.translation()[1] + 0.5 * held.size[1] - gripper.pad_y[1]
     tips = max(hang + drop_height, place.depth + _RIM_CLEARANCE)
-    p_WDrop = place.X_WB.translation() + np.array([0.0, 0.0, gripper.pad_y[1] + tips])
-    p_WDrop[2] += place.floor_height - place.X_WB.translation()[2]
-    shape = geometry.Box(*held.size)
-    half_extent = np.array([0.13, 0.06, 0.0])
-    poses = drop_poses(p_WDrop, half_extent, rng, count=10)
+    p_WDrop = place.X_WB.translation().copy()
+    p_WDrop[2] = place.floor_height + tips + gripper.pad_y[1]
+    half_extent = np.append(0.5 * (place.high - place.low)[:2] - _DROP_INSET, 0.0)
+    poses = drop_poses(p_WDrop, half_extent, rng, count=30)
+    if len(used) > 0:
+        p_WG = np.array([pose.translation() for pose in poses])
+        apart = np.linalg.norm((p_WG[:, None] - np.array(used))[:, :, :2], axis=2).min(axis=1)
+        poses = [poses[i] for i in np.argsort(-apart, kind="stable")]
     return plan_place(
         arm,
         q_start,
         poses,
         approach_height=0.0,
-        held=(shape, held.X_WB),
+        held=(geometry.Box(*held.size), held.X_WB),
         rng=rng,
         options=_CARRY,
     )
