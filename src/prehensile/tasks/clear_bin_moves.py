@@ -115,7 +115,8 @@ def plan_drop(
         place: the bin to fill.
         gripper: the hand.
         drop_height: height above the bin's floor at which the lowest point is let go [m].
-        used: where things were let go before, p_WG; the places farthest from them come first.
+        used: where things were let go before, p_WG; places over which nothing hangs
+            beyond the walls come first, and of these the farthest from the used ones.
         rng: of the places and of the search.
 
     Returns:
@@ -126,11 +127,10 @@ def plan_drop(
     p_WDrop = place.X_WB.translation().copy()
     p_WDrop[2] = place.floor_height + tips + gripper.pad_y[1]
     half_extent = np.append(0.5 * (place.high - place.low)[:2] - _DROP_INSET, 0.0)
-    poses = drop_poses(p_WDrop, half_extent, rng, count=30)
-    if len(used) > 0:
-        p_WG = np.array([pose.translation() for pose in poses])
-        apart = np.linalg.norm((p_WG[:, None] - np.array(used))[:, :, :2], axis=2).min(axis=1)
-        poses = [poses[i] for i in np.argsort(-apart, kind="stable")]
+    poses = sorted(
+        drop_poses(p_WDrop, half_extent, rng, count=30),
+        key=lambda X_WG: (_overhang(held, X_WG, place), -_nearest(X_WG, used)),
+    )
     return plan_place(
         arm,
         q_start,
@@ -140,6 +140,20 @@ def plan_drop(
         rng=rng,
         options=_CARRY,
     )
+
+
+def _overhang(held: Box, X_WG: RigidTransform, place: BinGeometry) -> float:
+    """How far what is held reaches beyond the walls of the bin, in steps of 2 cm [m]."""
+    corners = (np.indices((2, 2, 2)).reshape(3, 8) - 0.5) * held.size[:, None]
+    p_B = (place.X_WB.inverse() @ X_WG @ held.X_WB).multiply(corners)[:2].T
+    beyond = np.maximum(place.low[:2] - p_B, p_B - place.high[:2]).max()
+    return max(0.0, float(np.ceil(beyond / 0.02)) * 0.02)
+
+
+def _nearest(X_WG: RigidTransform, used: Sequence[np.ndarray]) -> float:
+    """Horizontal distance to the nearest of the places used before [m]."""
+    p_WG = X_WG.translation()
+    return min((float(np.linalg.norm((p_WG - p)[:2])) for p in used), default=0.0)
 
 
 @dc.dataclass(frozen=True)
