@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from prehensile.errors import Finding, InputError
 
@@ -311,6 +311,7 @@ class _Group:
 
 
 _SETTLED, _WAITING = 1.0, 2.0
+_NOTHING_DONE = EventStatus.DidNothing()
 
 
 class JointGuard(LeafSystem):
@@ -395,8 +396,11 @@ def _initialize(group: _Group, guard: LeafSystem, context: Context, values: Disc
     values.set_value(group.memory, np.concatenate([q, np.zeros(len(q) + 1)]))
 
 
-def _update(group: _Group, guard: LeafSystem, context: Context, values: DiscreteValues) -> None:
-    # The one place where Python runs in an idle station, hence the short way out for it.
+def _update(
+    group: _Group, guard: LeafSystem, context: Context, values: DiscreteValues
+) -> EventStatus:
+    # The one place where Python runs in an idle station, hence the short way out for it: nothing
+    # done, so that Drake keeps what it has computed from the commands.
     command = guard.EvalVectorInput(context, group.command)
     command = None if command is None else command.value()
     effort = guard.EvalVectorInput(context, group.effort)
@@ -406,9 +410,9 @@ def _update(group: _Group, guard: LeafSystem, context: Context, values: Discrete
     if fresh and effort is None:
         if command is None:
             if memory[-1] == _WAITING:
-                return
+                return _NOTHING_DONE
         elif command.tobytes() + group.rest == memory.tobytes():
-            return
+            return _NOTHING_DONE
     n = group.limits.size
     state = GuardState(
         position=values.value(group.positions).tolist(),
@@ -435,3 +439,4 @@ def _update(group: _Group, guard: LeafSystem, context: Context, values: Discrete
     values.set_value(group.efforts, state.effort)
     values.set_value(group.status, [float(state.status)])
     values.set_value(group.memory, [*state.command, *state.velocity, settled])
+    return EventStatus.Succeeded()
