@@ -7,6 +7,7 @@ Every subcommand is a module of this package with two functions, ``add_arguments
 
 import argparse
 import importlib
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -84,6 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(command: str, arguments: Sequence[str]) -> int:
+    # What Drake does is its own affair, what is wrong is ours. (It sets the level when imported.)
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
     module_name, text = COMMANDS[command]
     module = importlib.import_module(f"prehensile.cli.{module_name}")
     parser = argparse.ArgumentParser(prog=f"prehensile {command}", description=text)
