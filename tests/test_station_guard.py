@@ -17,10 +17,10 @@ from prehensile.station.guard import (
     GuardLimits,
     GuardState,
     GuardStatus,
-    JointGuard,
     brake_speed,
     guard_step,
 )
+from prehensile.station.guard_system import JointGuard
 
 LIMITS = GuardLimits(
     position_lower=(-1.0, -0.2),

@@ -11,7 +11,8 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 
 from prehensile.errors import Finding, InputError
-from prehensile.station.guard import COMMAND_PERIOD, GuardLimits, JointGuard
+from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
+from prehensile.station.guard_system import JointGuard
 from prehensile.station.scenario import Scenario
 
 
