@@ -28,6 +28,12 @@ def test_table_top_is_the_plane_z_0() -> None:
     assert below == pytest.approx(0.05, abs=1e-9)
 
 
+def test_floor_is_the_plane_z_0() -> None:
+    floor = scene("floor", weld="base_link")
+    for x, y, z in ((0.0, 0.0, 0.1), (1.9, -1.9, 0.02), (-1.5, 1.0, 0.3)):
+        assert floor.distance("base_link", np.array([x, y, z])) == pytest.approx(z, abs=1e-9)
+
+
 def test_bin_has_the_interior_that_it_says() -> None:
     made = scene("bin", weld="base_link")
 

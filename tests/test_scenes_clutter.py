@@ -5,6 +5,7 @@ import pytest
 from pydrake.geometry import SceneGraphConfig
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlantConfig
+from pydrake.systems.analysis import Simulator
 
 from prehensile.errors import InputError
 from prehensile.scenes.clutter import PlacedObject, drop_into_bin, inside_bin, with_objects
@@ -79,3 +80,19 @@ def test_unknown_objects_are_refused():
 )
 def test_inside_bin(p_BO, expected):
     assert inside_bin(X_WB.multiply(np.array(p_BO, dtype=float)), X_WB) is expected
+
+
+def test_what_falls_off_the_table_ends_on_the_floor():
+    # Without a floor a thing that falls spins faster and faster, until numbers overflow.
+    scenario = load_scenario("two_bins")
+    X_WO = RigidTransform([1.2, -1.0, 0.0])
+    brick = PlacedObject("brick", "foam_brick", X_WO)
+    scenario.directives[:] = with_objects(scenario.directives, [brick])
+    station = build(scenario)
+    simulator = Simulator(station)
+    simulator.AdvanceTo(1.5)
+    plant = station.GetSubsystemByName("plant")
+    context = plant.GetMyContextFromRoot(simulator.get_context())
+    body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName("brick"))
+    z = plant.EvalBodyPoseInWorld(context, body).translation()[2]
+    assert -0.75 + 0.02 < z < -0.75 + 0.05
