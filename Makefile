@@ -51,7 +51,6 @@ clean:  ## remove everything that was built, .venv too
 	  || { echo "prehensile needs Python 3.11 to 3.13: make PYTHON=python3.12 ..."; exit 1; }
 	$(PYTHON) -m venv .venv
 
-# The package is installed in place: Python files count as they are, C++ is built anew when it changes.
 # The package is installed in place: Python files count as they are, C++ is built anew on change.
 .venv/.installed: .venv/bin/python $(NATIVE)
 	$(PIP) --editable .

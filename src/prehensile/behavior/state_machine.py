@@ -140,7 +140,6 @@ class StateMachine(LeafSystem):
         super().__init__()
         self._task = task
         n = len(initial_position)
-        self._n = n
         self._position_port = self.DeclareVectorInputPort("position_measured", n)
         self._hand_port = self.DeclareVectorInputPort("hand_state", 2)
         self._image_ports: dict[str, InputPort] = {

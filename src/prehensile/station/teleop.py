@@ -34,7 +34,6 @@ from prehensile.station.slider_source import Gamepad, Knob, SliderSource
 from prehensile.viz.sliders import Slider, joint_sliders
 
 Mode = Literal["pose", "planar", "joints"]
-MODES: tuple[Mode, ...] = ("pose", "planar", "joints")
 
 # Greatest speeds of what the sliders command, m/s and rad/s.
 _LINEAR_SPEED, _ANGULAR_SPEED = 0.3, 1.2

@@ -89,10 +89,6 @@ class Mesh:
             faces=self.faces[:, ::-1].copy(),
         )
 
-    def with_uvs(self, offset: ArrayLike, scale: ArrayLike) -> "Mesh":
-        """The mesh with its texture coordinates moved into a part of an atlas."""
-        return dataclasses.replace(self, uvs=self.uvs * np.asarray(scale) + np.asarray(offset))
-
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner (3,), (3,) of the axis-aligned bounding box."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
