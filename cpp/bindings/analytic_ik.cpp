@@ -1,0 +1,7 @@
+#include "bindings.h"
+
+namespace prehensile {
+
+void BindAnalyticIk(nanobind::module_&) {}
+
+}  // namespace prehensile

@@ -1,0 +1,7 @@
+#include "bindings.h"
+
+namespace prehensile {
+
+void BindDifferentialIk(nanobind::module_&) {}
+
+}  // namespace prehensile

@@ -1,0 +1,1 @@
+// kinematic_tree

@@ -1,0 +1,84 @@
+"""Pictures of a scene without a browser: a camera anywhere, rendered by Drake's VTK engine."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    LightParameter,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.sensors import CameraInfo
+
+from prehensile.viz.images import as_rgb
+
+_RENDERER = "prehensile_picture"
+_BACKGROUND = (0.93, 0.94, 0.96)
+
+
+def look_at(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> RigidTransform:
+    """The pose of a camera that looks from one point at another.
+
+    Args:
+        eye: (3,) p_WC, where the camera is, in m.
+        target: (3,) p_WT, the point in the middle of its picture, in m.
+        up: (3,) direction in W that is up in the picture; not along the line of sight.
+
+    Returns:
+        X_WC of the optical frame: x right, y down, z into the scene.
+
+    Raises:
+        ValueError: eye and target coincide, or up is along the line of sight.
+    """
+    p_WC = np.asarray(eye, float)
+    z = np.asarray(target, float) - p_WC
+    x = np.cross(z, np.asarray(up, float))
+    if np.linalg.norm(x) < 1e-9:
+        raise ValueError("eye, target, up: the line of sight must differ from up")
+    y = np.cross(z, x)
+    axes = [axis / np.linalg.norm(axis) for axis in (x, y, z)]
+    return RigidTransform(RotationMatrix(np.column_stack(axes)), p_WC)
+
+
+def render(
+    diagram: Diagram,
+    context: Context,
+    X_WC: RigidTransform,
+    *,
+    width: int = 640,
+    height: int = 480,
+    fov_y: float = 0.7,
+) -> NDArray[np.uint8]:
+    """Takes a picture of a diagram's scene as it is in a context.
+
+    Args:
+        diagram: holds a SceneGraph named ``scene_graph``, such as a station or a RobotDiagram.
+        context: the diagram's; a renderer is added to it the first time.
+        X_WC: pose of the camera's optical frame, see :func:`look_at`.
+        width, height: of the picture in pixels.
+        fov_y: vertical angle of view in rad.
+
+    Returns:
+        (height, width, 3) uint8, row 0 on top.
+    """
+    scene_graph = diagram.GetSubsystemByName("scene_graph")
+    scene_context = scene_graph.GetMyMutableContextFromRoot(context)
+    if not scene_graph.HasRenderer(scene_context, _RENDERER):
+        light = LightParameter(type="directional", direction=[0.4, 0.5, 1.0], intensity=1.0)
+        fill = LightParameter(type="directional", direction=[-0.7, -0.3, 0.6], intensity=0.5)
+        params = RenderEngineVtkParams(
+            default_clear_color=np.array(_BACKGROUND), lights=[light, fill]
+        )
+        scene_graph.AddRenderer(scene_context, _RENDERER, MakeRenderEngineVtk(params))
+    core = RenderCameraCore(
+        _RENDERER, CameraInfo(width, height, fov_y), ClippingRange(0.01, 20.0), RigidTransform()
+    )
+    query = scene_graph.get_query_output_port().Eval(scene_context)
+    image = query.RenderColorImage(
+        ColorRenderCamera(core, False), scene_graph.world_frame_id(), X_WC
+    )
+    return as_rgb(image.data)
