@@ -7,7 +7,7 @@ CPP := $(filter %.cpp %.h,$(NATIVE))
 RUN := .venv/bin
 PIP = $(RUN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help demo test test-all test-cpp bench docs lint format models clean
+.PHONY: help demo test test-all test-cpp bench docs examples lint format models clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1|/' | column -t -s '|'
@@ -26,8 +26,10 @@ test-cpp: build/cpp/.tested  ## the C++ library's own tests
 bench: .venv/.installed  ## our speed beside the peers', each in a virtual environment of its own
 	$(RUN)/prehensile bench
 
-docs: .venv/.docs  ## the documentation as web pages, in site/
+docs: .venv/.docs build/examples/.run  ## the documentation as web pages, in site/
 	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --strict --quiet
+
+examples: build/examples/.run  ## run every example; their figures are in build/examples/
 
 lint: .venv/.dev  ## ruff, pyright, clang-format
 	$(RUN)/ruff check
@@ -63,6 +65,10 @@ clean:  ## remove everything that was built, .venv too
 
 .venv/.docs: .venv/.installed
 	$(PIP) 'prehensile[docs]'
+	@touch $@
+
+build/examples/.run: .venv/.dev $(wildcard examples/*.py)
+	$(RUN)/python -m pytest -q tests/test_examples.py
 	@touch $@
 
 # The C++ library by itself, as a C++ project would build it.

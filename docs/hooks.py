@@ -1,12 +1,24 @@
-"""Cross-references of docstrings (``:class:`~a.b.C```) as links, the last name as their text."""
+"""Cross-references of docstrings as links, and a page for each example with its figures."""
 
 import re
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr|data):<code>(~?)([\w.]+)</code>")
+ROOT = Path(__file__).parents[1]
+FIGURES = ROOT / "build" / "examples"
+CHAPTERS = {
+    "ch01": "1 Introduction",
+    "ch02": "2 Robots",
+    "ch03": "3 Pick and place",
+}
 
 
 def on_page_content(html: str, **_: object) -> str:
-    """Called by MkDocs with the HTML of each page."""
+    """Called by MkDocs with the HTML of each page: ``:class:`~a.b.C``` shows the last name."""
 
     def link(match: re.Match[str]) -> str:
         short, name = match.groups()
@@ -14,3 +26,45 @@ def on_page_content(html: str, **_: object) -> str:
         return f'<autoref identifier="{name}" optional><code>{text}</code></autoref>'
 
     return ROLE.sub(link, html)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Adds the examples to the navigation, chapter by chapter."""
+    pages: dict[str, list[Any]] = {}
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        chapter = CHAPTERS[path.stem[:4]]
+        pages.setdefault(chapter, []).append({_title(path): f"examples/{path.stem}.md"})
+    assert config.nav is not None
+    examples = [{"Examples": [{chapter: entries} for chapter, entries in pages.items()]}]
+    config.nav = [*config.nav[:-1], *examples, config.nav[-1]]
+    return config
+
+
+def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+    """Makes a page of each example, with its figures below the cells that draw them."""
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        page = File.generated(config, f"examples/{path.stem}.md", content=_page(path))
+        files.append(page)
+        for picture in sorted((FIGURES / path.stem).glob("*.png")):
+            uri = f"examples/{path.stem}/{picture.name}"
+            files.append(File.generated(config, uri, abs_src_path=str(picture)))
+    return files
+
+
+def _title(path: Path) -> str:
+    return path.read_text().splitlines()[1].removeprefix("# # ")
+
+
+def _page(path: Path) -> str:
+    """An example in percent format as Markdown."""
+    out = []
+    for cell in re.split(r"^# %%", path.read_text(), flags=re.MULTILINE)[1:]:
+        head, _, body = cell.partition("\n")
+        if "[markdown]" in head:
+            out.append(re.sub(r"^# ?", "", body.strip(), flags=re.MULTILINE))
+            continue
+        out.append(f"```python\n{body.strip()}\n```")
+        for name in re.findall(r'save_figure\([^"]*"(\w+)"\)', body):
+            out.append(f"![{name.replace('_', ' ')}]({path.stem}/{name}.png)")
+    out.append(f"*The file is `examples/{path.name}`; `.venv/bin/python` runs it.*")
+    return "\n\n".join(out)
