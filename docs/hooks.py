@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
@@ -55,13 +56,21 @@ def _title(path: Path) -> str:
     return path.read_text().splitlines()[1].removeprefix("# # ")
 
 
+def _formula(match: re.Match[str]) -> str:
+    display = "block" if match.group().startswith("$$") else "inline"
+    return convert(match.group(1).strip(), display=display)
+
+
 def _page(path: Path) -> str:
     """An example in percent format as Markdown."""
     out = []
     for cell in re.split(r"^# %%", path.read_text(), flags=re.MULTILINE)[1:]:
         head, _, body = cell.partition("\n")
         if "[markdown]" in head:
-            out.append(re.sub(r"^# ?", "", body.strip(), flags=re.MULTILINE))
+            text = re.sub(r"^# ?", "", body.strip(), flags=re.MULTILINE)
+            # Browsers draw MathML by themselves; no script is to be fetched from anywhere.
+            text = re.sub(r"\$\$(.+?)\$\$", _formula, text, flags=re.DOTALL)
+            out.append(re.sub(r"\$(.+?)\$", _formula, text, flags=re.DOTALL))
             continue
         out.append(f"```python\n{body.strip()}\n```")
         for name in re.findall(r'save_figure\([^"]*"(\w+)"\)', body):
