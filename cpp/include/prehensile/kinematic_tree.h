@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace prehensile {
+
+enum class JointType { kRevolute, kPrismatic };
+
+/// A joint of one degree of freedom. It moves its frame J: J is fixed in the parent's frame P
+/// while q = 0, turns about the axis by q rad (revolute) or slides along it by q m (prismatic).
+struct TreeJoint {
+  /// Index of the joint that moves P; -1 for the world.
+  int parent = -1;
+  /// Pose of J in P at q = 0.
+  Eigen::Matrix4d X_PJ = Eigen::Matrix4d::Identity();
+  /// Axis in J (and in P's orientation of it), of any length but zero.
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+  JointType type = JointType::kRevolute;
+};
+
+/// A frame F fixed to what a joint moves, or to the world.
+struct TreeFrame {
+  /// Index of the joint that moves F; -1 for the world.
+  int parent = -1;
+  Eigen::Matrix4d X_PF = Eigen::Matrix4d::Identity();
+};
+
+/// Forward kinematics of a tree of revolute and prismatic joints: poses of frames in the world W,
+/// and their geometric Jacobians.
+///
+/// Matrices are row-major in the caller's memory. A pose X_WF is 4×4, a Jacobian J is 6×n with
+/// V_WF = J q̇, rotational rows first, both expressed in W, V_WF that of F's origin.
+/// All methods are const and may be called from many threads. They do not look for NaN, and do
+/// not allocate for up to 32 joints between W and a frame.
+class KinematicTree {
+ public:
+  /// @param joints in the order of q; a parent may come after its children.
+  /// @param frames numbered 0, 1, ... in this order.
+  /// @throws std::invalid_argument naming the argument: a parent that does not exist or is its own
+  ///   ancestor; a pose that is none; an axis of no length.
+  KinematicTree(const std::vector<TreeJoint>& joints, const std::vector<TreeFrame>& frames);
+
+  int num_joints() const { return num_joints_; }
+  int num_frames() const { return static_cast<int>(frames_.size()); }
+
+  /// Pose and Jacobian of one frame.
+  ///
+  /// @param q n joint positions.
+  /// @param frame its number, 0 .. num_frames() - 1 (not checked).
+  /// @param X_WF room for 16 numbers, or nullptr.
+  /// @param J_WF room for 6 n numbers, or nullptr. Columns of joints that do not move F are zero.
+  void PoseAndJacobian(const double* q, int frame, double* X_WF, double* J_WF) const;
+
+  /// Jacobian of the spatial velocity V_AF_E of F measured in frame A and expressed in frame E.
+  ///
+  /// @param A, E numbers of frames; -1 for the world.
+  /// @param J room for 6 n numbers.
+  void RelativeJacobian(const double* q, int frame, int A, int E, double* J) const;
+
+  /// The same as PoseAndJacobian() for each of N rows of Q.
+  ///
+  /// @param X room for 16 N numbers, or nullptr.
+  /// @param J room for 6 n N numbers, or nullptr.
+  /// @param num_threads at least 1; it does not change the result.
+  void PosesAndJacobians(const double* Q, std::size_t N, int frame, double* X, double* J,
+                         int num_threads) const;
+
+ private:
+  /// One joint on the way from W to a frame, in a frame L of its own whose z is the axis.
+  struct Step {
+    std::array<double, 9> R_PL;  // Row-major, from the preceding step's L.
+    std::array<double, 3> p_PL;
+    int joint;
+    bool prismatic;
+  };
+
+  /// All steps on the way to a frame, and its pose in the last one's L (or in W).
+  struct Chain {
+    std::vector<Step> steps;
+    std::array<double, 9> R_LF;
+    std::array<double, 3> p_LF;
+  };
+
+  int num_joints_;
+  std::vector<Chain> frames_;
+};
+
+}  // namespace prehensile
