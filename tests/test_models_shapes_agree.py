@@ -11,7 +11,7 @@ from prehensile.models.generate import generate
 from prehensile.models.registry import find_model, load_spheres
 from prehensile.models.shapes import read_gltf
 
-MODELS = ("iiwa7", "iiwa14", "wsg50", "d415", "table", "bin", "shelves", "cupboard")
+MODELS = ("iiwa7", "iiwa14", "wsg50", "panda_hand", "d415", "table", "bin", "shelves", "cupboard")
 
 
 @pytest.mark.parametrize("name", MODELS)

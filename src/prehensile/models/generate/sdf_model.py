@@ -1,7 +1,8 @@
 """Models as plain values, and their SDF text.
 
 Only the part of SDF that our models use: links with visuals and collisions, joints with limits and
-rotors, frames, and groups of links that cannot touch one another.
+rotors and springs, frames, groups of links that cannot touch one another, and what closes a
+loop: points of two links that stay together, and joints that follow one another.
 """
 
 from collections.abc import Sequence
@@ -137,6 +138,9 @@ class Joint:
         axis: unit vector, in the frame ``expressed_in`` ("" for the joint's own).
         effort: limit in N m or N; 0 for a joint without an actuator.
         acceleration: limit in rad/s² or m/s² (None: not known), as ``velocity``.
+        spring: stiffness in N m/rad or N/m, and the position where it is at rest.
+        mimic: name of a joint that this one follows, multiplier and offset of its position; kept
+            by a constraint in discrete plants with a SAP solver, ignored in others.
     """
 
     name: str
@@ -154,6 +158,21 @@ class Joint:
     rotor_inertia: float | None = None
     pose: Pose = IDENTITY
     expressed_in: str = ""
+    spring: tuple[float, float] | None = None
+    mimic: tuple[str, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A point of link A that stays at a point of link B, each given in its link's frame, m.
+
+    Drake keeps it by a constraint in discrete plants with a SAP solver.
+    """
+
+    link_a: str
+    p_AP: tuple[float, float, float]
+    link_b: str
+    p_BQ: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -173,6 +192,7 @@ class Model:
         name: of the model and of its file.
         comment: goes to the head of the file.
         apart: groups of links whose members never collide with one another.
+        pins: what closes the loops of a linkage.
     """
 
     name: str
@@ -181,6 +201,7 @@ class Model:
     joints: tuple[Joint, ...] = ()
     frames: tuple[Frame, ...] = ()
     apart: tuple[tuple[str, ...], ...] = field(default=())
+    pins: tuple[Pin, ...] = ()
 
 
 def sdf_text(model: Model) -> str:
@@ -208,6 +229,14 @@ def sdf_text(model: Model) -> str:
         ]
     for joint in model.joints:
         out += [f"    {line}" for line in _joint_lines(joint)]
+    for pin in model.pins:
+        out.append("    <drake:ball_constraint>")
+        values = (("body_A", pin.link_a), ("p_AP", numbers(pin.p_AP)))
+        values += (("body_B", pin.link_b), ("p_BQ", numbers(pin.p_BQ)))
+        for key, value in values:
+            tag = f"drake:ball_constraint_{key}"
+            out.append(f"      <{tag}>{value}</{tag}>")
+        out.append("    </drake:ball_constraint>")
     for i, group in enumerate(model.apart):
         name = f"apart_{i}"
         out.append(f"    <drake:collision_filter_group name={quoteattr(name)}>")
@@ -263,6 +292,11 @@ def _joint_lines(joint: Joint) -> list[str]:
     }
     limit = "".join(f"<{k}>{number(v)}</{k}>" for k, v in limits.items() if v is not None)
     frame = f" expressed_in={quoteattr(joint.expressed_in)}" if joint.expressed_in else ""
+    dynamics = f"<damping>{number(joint.damping)}</damping>"
+    if joint.spring:
+        stiffness, rest = joint.spring
+        dynamics += f"<spring_reference>{number(rest)}</spring_reference>"
+        dynamics += f"<spring_stiffness>{number(stiffness)}</spring_stiffness>"
     out = [f"<joint name={quoteattr(joint.name)} type={quoteattr(joint.kind)}>"]
     if joint.pose != IDENTITY:
         out.append(f"  <pose>{numbers(joint.pose)}</pose>")
@@ -272,11 +306,15 @@ def _joint_lines(joint: Joint) -> list[str]:
         "  <axis>",
         f"    <xyz{frame}>{numbers(joint.axis)}</xyz>",
         f"    <limit>{limit}</limit>",
-        f"    <dynamics><damping>{number(joint.damping)}</damping></dynamics>",
+        f"    <dynamics>{dynamics}</dynamics>",
         "  </axis>",
     ]
     if joint.gear_ratio is not None:
         out.append(f"  <drake:gear_ratio>{number(joint.gear_ratio)}</drake:gear_ratio>")
     if joint.rotor_inertia is not None:
         out.append(f"  <drake:rotor_inertia>{number(joint.rotor_inertia)}</drake:rotor_inertia>")
+    if joint.mimic:
+        other, multiplier, offset = joint.mimic
+        factors = f'multiplier="{number(multiplier)}" offset="{number(offset)}"'
+        out.append(f"  <drake:mimic joint={quoteattr(other)} {factors}/>")
     return [*out, "</joint>"]

@@ -1,7 +1,8 @@
 """How the gripper looks, and the volume mesh of its pads."""
 
-import numpy as np
+from pydrake.math import RigidTransform
 
+from prehensile.models.generate.robots._pad import pad_mesh
 from prehensile.models.shapes import (
     Material,
     Mesh,
@@ -26,30 +27,10 @@ BLACK = Material("black", (0.02, 0.02, 0.022, 1.0), roughness=0.8)
 GREEN = Material("lamp", (0.1, 0.8, 0.2, 1.0), roughness=0.4)
 
 
-def pad_mesh() -> str:
-    """The pad as tetrahedra, in VTK's legacy format: a pyramid on the face that grips.
-
-    A patch of contact has as many polygons as tetrahedra are cut. A box has forty; this has eight
-    under its face, four to carry the load and four at the rim, whose centres lie about as far
-    from the middle as the mean of the face, so that the pad resists turning as a whole one does.
-    The apex lies in the stem. Pressure rises from zero at the surface to the hydroelastic modulus
-    at the inner point.
-    """
-    face, middle = -FINGER_X, FINGER_TIP - PAD_LENGTH / 2
-    low, high, side = FINGER_TIP - PAD_LENGTH, FINGER_TIP, PAD_WIDTH / 2
-    points = [(face, low, -side), (face, high, -side), (face, high, side), (face, low, side),
-              (face, middle, 0.0), (0.0, middle, 0.0), (face + 0.004, middle, 0.0)]  # fmt: skip
-    cells = []
-    for i in range(4):
-        j = (i + 1) % 4
-        cells += [(i, j, 4, 6), (j, i, 5, 6)]  # under the face, behind the rim
-    lines = ["# vtk DataFile Version 3.0", "pad of rubber", "ASCII", "DATASET UNSTRUCTURED_GRID"]
-    lines.append(f"POINTS {len(points)} double")
-    lines += [" ".join(f"{np.round(v, 9) + 0.0:g}" for v in point) for point in points]
-    lines.append(f"CELLS {len(cells)} {5 * len(cells)}")
-    lines += ["4 " + " ".join(map(str, cell)) for cell in cells]
-    lines += [f"CELL_TYPES {len(cells)}", *(["10"] * len(cells)), ""]
-    return "\n".join(lines)
+def pad_volume() -> str:
+    """The pad of a finger, in its frame, as a volume mesh."""
+    X_LP = RigidTransform([-FINGER_X, FINGER_TIP - PAD_LENGTH / 2, 0.0])
+    return pad_mesh(X_LP, PAD_LENGTH, PAD_WIDTH, depth=FINGER_X, core=0.004)
 
 
 def body_parts() -> list[Part]:

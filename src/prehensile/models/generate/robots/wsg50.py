@@ -20,7 +20,7 @@ from prehensile.models.generate.robots._wsg50_shape import (
     PAD_WIDTH,
     body_parts,
     finger_parts,
-    pad_mesh,
+    pad_volume,
 )
 from prehensile.models.generate.sdf_model import (
     Collision,
@@ -119,7 +119,7 @@ def generate(folder: Path) -> None:
     made = model()
     write_gltf(folder / "body.gltf", body_parts())
     write_gltf(folder / "finger.gltf", finger_parts())
-    write_atomic(folder / "pad.vtk", pad_mesh())
+    write_atomic(folder / "pad.vtk", pad_volume())
     write_atomic(folder / "wsg50.sdf", sdf_text(made))
     write_spheres(folder, cover_model(model(PAD_BOX), bulge=0.016))
     write_description(
