@@ -36,6 +36,7 @@ def drivers() -> dict[str, Driver]:
         wsg.DRIVER,
         joint_control.INVERSE_DYNAMICS,
         joint_control.JOINT_STIFFNESS,
+        joint_control.JOINT_PID,
         zero_force.DRIVER,
     )
     found = {driver.tag: driver for driver in own}

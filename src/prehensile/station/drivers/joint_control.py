@@ -1,31 +1,41 @@
-"""Two drivers for any robot in simulation: inverse dynamics with PID, and joint stiffness.
+"""Drivers for any robot in simulation: PID, inverse dynamics with PID, and joint stiffness.
 
-Both hold commanded joint positions against gravity, and read scenarios written for the drivers of
-the same names elsewhere. Their ports are those of an arm: ``MODEL.position``,
-``MODEL.feedforward_torque`` (stiffness only), ``MODEL.position_measured``,
-``MODEL.velocity_estimated``, ``MODEL.position_commanded``, ``MODEL.state_estimated``.
+All hold commanded joint positions, by the controllers of
+:mod:`prehensile.control.joint_controller`; inverse dynamics and stiffness read scenarios written
+for the drivers of the same names elsewhere. Their ports are those of an arm, with a value for each
+joint that has an actuator: ``MODEL.position``, ``MODEL.feedforward_torque`` (not with inverse
+dynamics), ``MODEL.position_measured``, ``MODEL.velocity_estimated``, ``MODEL.position_commanded``,
+``MODEL.state_estimated``. Joints without one, such as those of a linkage, follow as they must; only
+inverse dynamics does not drive such models.
 """
 
 import dataclasses as dc
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.multibody.tree import PdControllerGains
-from pydrake.systems.controllers import InverseDynamics, InverseDynamicsController
-from pydrake.systems.framework import InputPort, OutputPort
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint
 from pydrake.systems.primitives import (
-    Adder,
     Demultiplexer,
-    MatrixGain,
-    Multiplexer,
     SharedPointerSystem,
     StateInterpolatorWithDiscreteDerivative,
 )
 
-from prehensile.station.drivers.site import Driver, GuardPorts, Site
+from prehensile.control.gains import JointGains, gains_for_bandwidth
+from prehensile.control.inertia import joint_inertia, random_configurations
+from prehensile.control.joint_controller import (
+    ControllerKind,
+    JointControllerConfig,
+    actuators_of,
+    add_joint_controller,
+    controlled_joints,
+)
+from prehensile.station.drivers.site import Driver, Site
 from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
 from prehensile.station.robot_plant import make_robot_plant
+
+_POSTURES = 64  # at which the inertia is taken that gains for a bandwidth are made for
 
 
 @dc.dataclass
@@ -73,23 +83,58 @@ class JointStiffnessDriver:
     """Springs and dampers at the joints, with gravity compensated.
 
     Attributes:
-        gains: gains by actuator; joints of actuators not named have none and hang.
+        gains: gains by actuator.
         hand_model_name: the hand on the arm. What is welded to the arm is accounted for in any
             case; a name given here is checked.
+        bandwidth: rad/s (>= 0), for which joints whose actuators are not named get critically
+            damped gains, see :func:`prehensile.control.gains.gains_for_bandwidth`; 0 gives them
+            none, and they hang.
     """
 
     gains: Mapping[str, JointPdControllerGains] = dc.field(default_factory=dict)
     hand_model_name: str = ""
+    bandwidth: float = 0
 
 
-def _actuator_names(site: Site) -> list[str]:
-    """Names of the driven actuators as the gains' keys use them, checked against the keys."""
+@dc.dataclass
+class JointPidGains:
+    """Gains of one joint of the PID driver.
+
+    Attributes:
+        kp: position gain, N m/rad or N/m (>= 0).
+        ki: integral gain, N m/(rad s) or N/(m s) (>= 0).
+        kd: velocity gain, N m s/rad or N s/m (>= 0).
+    """
+
+    kp: float = 0
+    ki: float = 0
+    kd: float = 0
+
+
+@dc.dataclass
+class JointPidDriver:
+    """A PID controller for each joint by itself.
+
+    Attributes:
+        gains: gains by actuator (``MODEL_ACTUATOR`` where several models are driven as one).
+        gravity_compensation: whether the robot's weight is held by a model of it.
+        bandwidth: rad/s (>= 0), for which joints whose actuators are not named get critically
+            damped gains; 0 gives them none.
+        integral_rate: rad/s (>= 0), the pole of the integral in these gains; 0 for none.
+    """
+
+    gains: Mapping[str, JointPidGains] = dc.field(default_factory=dict)
+    gravity_compensation: bool = True
+    bandwidth: float = 20
+    integral_rate: float = 0
+
+
+def _check(site: Site) -> list[str]:
+    """Checks the names of actuators and hand; returns the names as the gains' keys use them."""
     names = []
     for model, instance in zip(site.models, site.instances, strict=True):
         prefix = f"{model}_" if len(site.models) > 1 else ""
-        # Before the plant is finalized it lists actuators for all models together only.
-        every = (site.plant.get_joint_actuator(i) for i in site.plant.GetJointActuatorIndices())
-        names += [prefix + a.name() for a in every if a.model_instance() == instance]
+        names += [prefix + actuator.name() for actuator in actuators_of(site.plant, [instance])]
     for name in site.config.gains:
         if name not in names:
             known = ", ".join(names)
@@ -97,142 +142,132 @@ def _actuator_names(site: Site) -> list[str]:
     return names
 
 
-def _joint_limits(site: Site) -> GuardLimits:
-    """Limits of all driven models' joints, one model after the other."""
-    each = [GuardLimits.of_plant(site.plant, instance) for instance in site.instances]
-
-    def joined(name: str) -> tuple[float, ...]:
-        return tuple(value for limits in each for value in getattr(limits, name))
-
-    return GuardLimits(
-        position_lower=joined("position_lower"),
-        position_upper=joined("position_upper"),
-        velocity=joined("velocity"),
-        acceleration=joined("acceleration"),
-        effort_lower=joined("effort_lower"),
-        effort_upper=joined("effort_upper"),
-        effort_default=joined("effort_default"),
-    )
+def _joints(site: Site) -> list[Joint]:
+    """The joints that are driven."""
+    try:
+        return controlled_joints(site.plant, site.instances)
+    except ValueError as error:
+        site.fail(str(error), "drive a model whose joints have actuators")
 
 
-def _joined_state(site: Site) -> OutputPort:
-    """The state [q, v] of all driven models, one model after the other in q and in v."""
-    ports = [site.plant.get_state_output_port(instance) for instance in site.instances]
-    if len(ports) == 1:
-        return ports[0]
-    sizes = [port.size() // 2 for port in ports]
-    n = sum(sizes)
-    # From (q1, v1, q2, v2, ...) to (q1, q2, ..., v1, v2, ...).
-    order = np.zeros((2 * n, 2 * n))
-    q_row, column = 0, 0
-    for size in sizes:
-        for i in range(size):
-            order[q_row + i, column + i] = 1.0
-            order[n + q_row + i, column + size + i] = 1.0
-        q_row, column = q_row + size, column + 2 * size
-    mux = site.builder.AddNamedSystem(f"{site.name}.states", Multiplexer([2 * s for s in sizes]))
-    for i, port in enumerate(ports):
-        site.builder.Connect(port, mux.get_input_port(i))
-    gain = site.builder.AddNamedSystem(f"{site.name}.state", MatrixGain(order))
-    site.builder.Connect(mux.get_output_port(0), gain.get_input_port())
-    return gain.get_output_port()
-
-
-def _connect_actuation(site: Site, effort: OutputPort) -> None:
-    """Gives each driven model its part of the efforts."""
-    sizes = [site.plant.num_actuators(instance) for instance in site.instances]
-    split = site.builder.AddNamedSystem(f"{site.name}.efforts", Demultiplexer(sizes))
-    site.builder.Connect(effort, split.get_input_port())
-    for i, instance in enumerate(site.instances):
-        site.builder.Connect(
-            split.get_output_port(i), site.plant.get_actuation_input_port(instance)
+def _joint_limits(site: Site, joints: Sequence[Joint]) -> GuardLimits:
+    """Limits of the driven joints in their order."""
+    values: dict[str, list[float]] = {
+        field.name: [] for field in dc.fields(GuardLimits) if field.name != "jump"
+    }
+    for joint in joints:
+        every = site.plant.GetVelocitiesFromArray(
+            joint.model_instance(), np.arange(site.plant.num_velocities())
         )
+        limits = GuardLimits.of_plant(site.plant, joint.model_instance())
+        place = every.tolist().index(joint.velocity_start())
+        for name, numbers in values.items():
+            numbers.append(getattr(limits, name)[place])
+    joined: dict[str, Any] = {name: tuple(numbers) for name, numbers in values.items()}
+    return GuardLimits(**joined)
 
 
-def _command(
-    site: Site, state: OutputPort, desired_state: InputPort, *, effort: bool
-) -> GuardPorts:
-    """Adds the guard and what makes a desired state of its positions; exports the ports."""
-    limits = _joint_limits(site)
-    n = limits.size
-    builder = site.builder
+def _add(site: Site, kind: ControllerKind, gains: JointGains, model: MultibodyPlant) -> None:
+    """Adds controller, guard, and what makes a desired state of its positions; exports ports."""
+    builder, joints = site.builder, _joints(site)
+    n = len(joints)
+    feedforward = kind != "inverse-dynamics"
+    try:
+        controller = add_joint_controller(
+            builder,
+            site.plant,
+            site.instances,
+            JointControllerConfig(gains, kind, feedforward=feedforward),
+            controller_plant=model,
+            name=site.name,
+        )
+    except ValueError as error:
+        site.fail(str(error), "take another driver for this model")
     split = builder.AddNamedSystem(f"{site.name}.measured", Demultiplexer([n, n]))
-    builder.Connect(state, split.get_input_port())
-    defaults = [site.plant.GetDefaultPositions(instance) for instance in site.instances]
+    builder.Connect(controller.state, split.get_input_port())
+    default = site.plant.GetDefaultPositions()
     guard = site.add_guard(
-        limits,
+        _joint_limits(site, joints),
         split.get_output_port(0),
-        effort="feedforward_torque" if effort else "",
-        default_position=np.concatenate(defaults),
+        effort="feedforward_torque" if feedforward else "",
+        default_position=default[[joint.position_start() for joint in joints]],
     )
+    if controller.feedforward is not None:
+        builder.Connect(guard.effort, controller.feedforward)
     derivative = builder.AddNamedSystem(
         f"{site.name}.desired",
         StateInterpolatorWithDiscreteDerivative(n, COMMAND_PERIOD, suppress_initial_transient=True),
     )
     builder.Connect(guard.position, derivative.get_input_port())
-    builder.Connect(derivative.get_output_port(), desired_state)
+    builder.Connect(derivative.get_output_port(), controller.desired_state)
     site.export_output(guard.position, "position_commanded")
     site.export_output(split.get_output_port(0), "position_measured")
     site.export_output(split.get_output_port(1), "velocity_estimated")
-    site.export_output(state, "state_estimated")
-    return guard
+    site.export_output(controller.state, "state_estimated")
 
 
-def _controller_plant(site: Site) -> Any:
+def _controller_plant(site: Site) -> MultibodyPlant:
     plant = make_robot_plant(site.scenario, site.models, frozen_children=True)
     site.builder.AddNamedSystem(f"{site.name}.controller_plant", SharedPointerSystem(plant))
     return plant
 
 
+def _gains(site: Site, names: Sequence[str], given: Mapping[str, Any]) -> JointGains:
+    """Gains in the order of the joints, from those given by actuator."""
+    actuators = actuators_of(site.plant, site.instances)
+    by_joint = {a.joint().index(): given[n] for a, n in zip(actuators, names, strict=True)}
+    each = [by_joint[joint.index()] for joint in _joints(site)]
+    return JointGains(*(np.array([getattr(g, k, 0.0) for g in each]) for k in ("kp", "kd", "ki")))
+
+
+def _default_gains(
+    site: Site, model: MultibodyPlant, names: Sequence[str], integral_rate: float = 0.0
+) -> dict[str, JointPidGains]:
+    """Gains by actuator for the bandwidth that is wanted, at the robot's greatest inertia."""
+    if site.config.bandwidth == 0.0:
+        return dict.fromkeys(names, JointPidGains())
+    default = model.GetDefaultPositions()
+    postures = np.vstack([default, random_configurations(model, _POSTURES)])
+    largest = joint_inertia(model, postures).largest
+    made = {}
+    for actuator, name in zip(actuators_of(site.plant, site.instances), names, strict=True):
+        instance = site.plant.GetModelInstanceName(actuator.model_instance())
+        joint = model.GetJointByName(
+            actuator.joint().name(), model.GetModelInstanceByName(instance)
+        )
+        gains = gains_for_bandwidth(
+            largest[joint.velocity_start()], site.config.bandwidth, integral_rate=integral_rate
+        )
+        made[name] = JointPidGains(kp=gains.kp[0], ki=gains.ki[0], kd=gains.kd[0])
+    return made
+
+
 def _simulate_inverse_dynamics(site: Site) -> None:
     site.check_joints()
-    names = _actuator_names(site)
-    plant = _controller_plant(site)
-    default = JointPidControllerGains()
-    gains = [site.config.gains.get(name, default) for name in names]
-    controller = site.builder.AddNamedSystem(
-        f"{site.name}.controller",
-        InverseDynamicsController(
-            plant,
-            kp=np.array([g.kp for g in gains]),
-            ki=np.array([g.ki for g in gains]),
-            kd=np.array([g.kd for g in gains]),
-            has_reference_acceleration=False,
-        ),
-    )
-    state = _joined_state(site)
-    site.builder.Connect(state, controller.get_input_port_estimated_state())
-    _connect_actuation(site, controller.get_output_port_control())
-    _command(site, state, controller.get_input_port_desired_state(), effort=False)
-
-
-def _prepare_stiffness(site: Site) -> None:
-    _actuator_names(site)
-    for name, gains in site.config.gains.items():
-        actuator = site.plant.GetJointActuatorByName(name, site.instance)
-        actuator.set_controller_gains(PdControllerGains(p=gains.kp, d=gains.kd))
+    names = _check(site)
+    default = dict.fromkeys(names, JointPidControllerGains())
+    gains = _gains(site, names, {**default, **site.config.gains})
+    _add(site, "inverse-dynamics", gains, _controller_plant(site))
 
 
 def _simulate_stiffness(site: Site) -> None:
-    site.check_joints()
+    names = _check(site)
     hand = site.config.hand_model_name
     if hand and not site.plant.HasModelInstanceNamed(hand):
         site.fail(f"no model '{hand}'", "name the hand's model, or leave it out", "hand_model_name")
-    plant, builder = _controller_plant(site), site.builder
-    gravity = builder.AddNamedSystem(
-        f"{site.name}.gravity_compensation",
-        InverseDynamics(plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation),
-    )
-    state = _joined_state(site)
-    builder.Connect(state, gravity.get_input_port_estimated_state())
-    guard = _command(
-        site, state, site.plant.get_desired_state_input_port(site.instance), effort=True
-    )
-    total = builder.AddNamedSystem(f"{site.name}.effort", Adder(2, plant.num_velocities()))
-    builder.Connect(gravity.get_output_port_generalized_force(), total.get_input_port(0))
-    builder.Connect(guard.effort, total.get_input_port(1))
-    _connect_actuation(site, total.get_output_port())
+    model = _controller_plant(site)
+    gains = {**_default_gains(site, model, names), **site.config.gains}
+    _add(site, "stiffness", _gains(site, names, gains), model)
+
+
+def _simulate_pid(site: Site) -> None:
+    names = _check(site)
+    model = _controller_plant(site)
+    default = _default_gains(site, model, names, site.config.integral_rate)
+    gains = _gains(site, names, {**default, **site.config.gains})
+    _add(site, "gravity-compensation" if site.config.gravity_compensation else "pid", gains, model)
 
 
 INVERSE_DYNAMICS = Driver(InverseDynamicsDriver, _simulate_inverse_dynamics)
-JOINT_STIFFNESS = Driver(JointStiffnessDriver, _simulate_stiffness, prepare=_prepare_stiffness)
+JOINT_STIFFNESS = Driver(JointStiffnessDriver, _simulate_stiffness)
+JOINT_PID = Driver(JointPidDriver, _simulate_pid)
