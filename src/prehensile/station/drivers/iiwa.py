@@ -1,4 +1,9 @@
-"""The KUKA LBR iiwa: joint positions with feed-forward torque, at 200 Hz."""
+"""The KUKA LBR iiwa: joint positions with feed-forward torque, at 200 Hz.
+
+The arm may have fewer joints than the real one has, as that of an exercise in a plane.
+"""
+
+from copy import copy
 
 import numpy as np
 from drake import lcmt_iiwa_command, lcmt_iiwa_status
@@ -22,6 +27,7 @@ from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
 from prehensile.station.robot_plant import make_robot_plant
 
 _TORQUE_PERIOD = 0.001  # s; the driver takes commands at 1 kHz if they are torques alone
+_POSITION_GAIN = 1500.0  # 1/s^2, where the arm has not seven joints and Drake no gains for it
 _STATUS_TIMEOUT = 10.0  # s to wait for the first status message
 
 _MEASUREMENTS = (
@@ -36,7 +42,7 @@ _MEASUREMENTS = (
 
 def _check(site: Site) -> IiwaControlMode:
     """Checks the configuration against the model; returns its control mode."""
-    site.check_joints(kIiwaArmNumJoints)
+    site.check_joints()
     config: IiwaDriver = site.config
     hand = config.hand_model_name
     if hand and not site.plant.HasModelInstanceNamed(hand):
@@ -67,7 +73,10 @@ def _add_guard(site: Site, mode: IiwaControlMode, measured: OutputPort) -> Guard
 
 def _simulate(site: Site) -> None:
     mode = _check(site)
-    builder = site.builder
+    builder, config = site.builder, copy(site.config)
+    n = site.plant.num_positions(site.instance)
+    if position_enabled(mode) and config.desired_kp_gains is None and n != kIiwaArmNumJoints:
+        config.desired_kp_gains = np.full(n, _POSITION_GAIN)
     # The arm's own model of itself: whatever is bolted to it counts as one rigid piece.
     controller_plant = make_robot_plant(site.scenario, [site.name], frozen_children=True)
     builder.AddNamedSystem(f"{site.name}.controller_plant", SharedPointerSystem(controller_plant))
@@ -75,7 +84,7 @@ def _simulate(site: Site) -> None:
         builder=builder,
         plant=site.plant,
         iiwa_instance=site.instance,
-        driver_config=site.config,
+        driver_config=config,
         controller_plant=controller_plant,
     )
     driver.set_name(f"{site.name}.driver")
@@ -91,7 +100,8 @@ def _simulate(site: Site) -> None:
 def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
     mode = _check(site)
     builder, name = site.builder, site.name
-    receiver = builder.AddNamedSystem(f"{name}.status_receiver", IiwaStatusReceiver())
+    n = site.plant.num_positions(site.instance)
+    receiver = builder.AddNamedSystem(f"{name}.status_receiver", IiwaStatusReceiver(n))
     subscriber = builder.AddNamedSystem(
         f"{name}.status_subscriber",
         LcmSubscriberSystem.Make(
@@ -106,7 +116,7 @@ def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
     measured = receiver.get_position_measured_output_port()
     guard = _add_guard(site, mode, measured)
 
-    sender = builder.AddNamedSystem(f"{name}.command_sender", IiwaCommandSender(control_mode=mode))
+    sender = builder.AddNamedSystem(f"{name}.command_sender", IiwaCommandSender(n, mode))
     publisher = builder.AddNamedSystem(
         f"{name}.command_publisher",
         LcmPublisherSystem.Make(
@@ -127,15 +137,15 @@ def _connect(site: Site) -> tuple[OutputPort, np.ndarray]:
         port = receiver.GetOutputPort(port_name)
         if port_name in ("torque_commanded", "torque_measured"):
             # The messages carry these two with the opposite sign.
-            negate = builder.AddSystem(Gain(-1.0, kIiwaArmNumJoints))
+            negate = builder.AddSystem(Gain(-1.0, n))
             builder.Connect(port, negate.get_input_port())
             port = negate.get_output_port()
         site.export_output(port, port_name)
-    state = builder.AddSystem(Multiplexer([kIiwaArmNumJoints] * 2))
+    state = builder.AddSystem(Multiplexer([n, n]))
     builder.Connect(measured, state.get_input_port(0))
     builder.Connect(receiver.get_velocity_estimated_output_port(), state.get_input_port(1))
     site.export_output(state.get_output_port(0), "state_estimated")
-    return measured, np.eye(kIiwaArmNumJoints)
+    return measured, np.eye(n)
 
 
 DRIVER = Driver(IiwaDriver, _simulate, _connect)
