@@ -1,0 +1,61 @@
+"""What the housings of all arms are made with: shells cut off at the joints, and rings there."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from prehensile.models.shapes import Material, Mesh, Part, cylinder
+from prehensile.models.shapes.implicit import Field, polygonize, split
+
+GAP = 0.0016
+"""Half of what is between two links, m."""
+
+DARK = Material("dark", (0.03, 0.031, 0.034, 1.0), metallic=0.0, roughness=0.6)
+
+Plane = tuple[int, float, float]
+"""Axis 0 to 2, a place on it in m, and the sign of the side that is kept."""
+
+
+def shell(body: Field, low: Sequence[float], high: Sequence[float], step: float) -> Mesh:
+    """The surface of a body in a box; the box is widened for the body to lie inside it."""
+    margin = 2.0 * step
+    return polygonize(body, np.asarray(low) - margin, np.asarray(high) + margin, step)
+
+
+def kept(mesh: Mesh, body: Field, *planes: Plane) -> Mesh:
+    """What of the surface of a body lies on the kept sides of planes."""
+    for plane in planes:
+        mesh = divided(mesh, body, plane)[0]
+    return mesh
+
+
+def divided(mesh: Mesh, body: Field, plane: Plane) -> tuple[Mesh, Mesh]:
+    """The surface of a body on the kept side of a plane, and the rest of it.
+
+    Raises:
+        ValueError: one of the two is empty.
+    """
+    axis, place, sign = plane
+    inner, outer = split(mesh, lambda p: sign * (place - p[..., axis]), body)
+    if inner is None or outer is None:
+        raise ValueError("plane: it does not cut the housing")
+    return inner, outer
+
+
+def disc(
+    radius: float, start: Sequence[float], end: Sequence[float], rounding: float = 0.0
+) -> Mesh:
+    """A cylinder between two points of a link, its rims rounded."""
+    a, b = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(b - a))
+    z = (b - a) / length
+    x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [0.0, 0.0, 1.0], z)
+    x /= np.linalg.norm(x)
+    R = np.column_stack([x, np.cross(z, x), z])
+    return cylinder(radius, length, rounding=rounding).transformed(R, 0.5 * (a + b))
+
+
+def ring(radius: float, at: Sequence[float], axis: int) -> Part:
+    """The dark ring in the gap at a joint."""
+    half = 0.006 * np.eye(3)[axis]
+    return Part(disc(radius - 0.0015, np.asarray(at) - half, np.asarray(at) + half), DARK)
