@@ -3,42 +3,24 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from prehensile.kinematics.poses import pose_distance, pose_error, rotation_vector, straight_line
-
-components = st.floats(-1.0, 1.0)
-axes = st.tuples(components, components, components).filter(lambda a: np.linalg.norm(a) > 0.1)
-
-
-@given(axis=axes, angle=st.floats(0.0, np.pi))
-def test_rotation_vector_is_the_logarithm(axis, angle):
-    unit = np.array(axis) / np.linalg.norm(axis)
-    R = RotationMatrix(AngleAxis(angle, unit)).matrix()
-    vector = rotation_vector(R)
-    size = np.linalg.norm(vector)
-    assert size == pytest.approx(angle, abs=2e-8)
-    back = RotationMatrix(AngleAxis(size, vector / size)) if size > 0 else RotationMatrix()
-    np.testing.assert_allclose(back.matrix(), R, atol=1e-7)
-
-
-def test_rotation_vector_of_half_turns():
-    for axis in np.vstack([np.eye(3), [[0.6, 0.8, 0.0], [0.6, 0.0, -0.8]]]):
-        vector = rotation_vector(RotationMatrix(AngleAxis(np.pi, axis)).matrix())
-        np.testing.assert_allclose(np.abs(vector @ axis), np.pi, atol=1e-7)
+from prehensile.kinematics.poses import (
+    pose_distance,
+    pose_error,
+    random_pose,
+    straight_line,
+    twist_error,
+)
+from prehensile.kinematics.rotations import random_rotation
+from prehensile.kinematics.spatial import adjoint, exp_se3
 
 
 def test_pose_error_moves_one_frame_to_the_other():
     rng = np.random.default_rng(0)
     for _ in range(50):
-        X_WA, X_WB = (
-            RigidTransform(RotationMatrix(_random_rotation(rng)), rng.normal(size=3))
-            for _ in range(2)
-        )
+        X_WA, X_WB = (random_pose(rng) for _ in range(2))
         error = pose_error(X_WA, X_WB)
         angle = np.linalg.norm(error[:3])
         R_AB_W = RotationMatrix(AngleAxis(angle, error[:3] / angle))
@@ -48,8 +30,8 @@ def test_pose_error_moves_one_frame_to_the_other():
 
 def test_straight_line_is_straight_even_and_bounded():
     rng = np.random.default_rng(1)
-    X_WA = RigidTransform(RotationMatrix(_random_rotation(rng)), [0.1, 0.2, 0.3])
-    X_WB = RigidTransform(RotationMatrix(_random_rotation(rng)), [-0.4, 0.2, 0.9])
+    X_WA = RigidTransform(random_rotation(rng), [0.1, 0.2, 0.3])
+    X_WB = RigidTransform(random_rotation(rng), [-0.4, 0.2, 0.9])
     poses = straight_line(X_WA, X_WB, 0.01, 0.05)
     distance, angle = pose_distance(X_WA, X_WB)
     assert poses[0] is X_WA
@@ -66,7 +48,32 @@ def test_straight_line_between_equal_poses_has_both_ends():
     assert len(straight_line(X, X, 0.01, 0.05)) == 2
 
 
-def _random_rotation(rng: np.random.Generator) -> np.ndarray:
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
-    q = q * np.sign(np.diag(r))
-    return q * np.linalg.det(q)
+def test_twist_error_carries_one_frame_to_the_other_from_either_side():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        X_WA, X_WB = random_pose(rng), random_pose(rng)
+        twist = twist_error(X_WA, X_WB)
+        assert (X_WA @ exp_se3(twist)).IsNearlyEqualTo(X_WB, 1e-12)
+        assert (exp_se3(adjoint(X_WA) @ twist) @ X_WA).IsNearlyEqualTo(X_WB, 1e-12)
+
+
+def test_errors_of_a_small_motion_agree_with_its_velocity():
+    # Both errors are velocities to first order, each in its own frame and at its own point.
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        X_WA = random_pose(rng)
+        V_WA_A = rng.normal(size=6)
+        X_WB = X_WA @ exp_se3(1e-6 * V_WA_A)
+        R_WA = X_WA.rotation().matrix()
+        V_WA_W = np.concatenate([R_WA @ V_WA_A[:3], R_WA @ V_WA_A[3:]])
+        np.testing.assert_allclose(pose_error(X_WA, X_WB) / 1e-6, V_WA_W, atol=1e-5)
+        np.testing.assert_allclose(twist_error(X_WA, X_WB) / 1e-6, V_WA_A, atol=1e-9)
+
+
+def test_random_poses_lie_in_their_box_and_repeat():
+    lower, upper = np.array([0.0, -1.0, 2.0]), np.array([1.0, 1.0, 2.5])
+    poses = [random_pose(np.random.default_rng(k), lower, upper) for k in (0, 0, 1)]
+    assert poses[0].IsExactlyEqualTo(poses[1])
+    assert not poses[0].IsNearlyEqualTo(poses[2], 1e-3)
+    for X in poses:
+        assert np.all((X.translation() >= lower) & (X.translation() <= upper))

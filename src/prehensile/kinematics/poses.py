@@ -1,35 +1,20 @@
-"""Small functions on poses: the difference of two, and the straight line between two."""
+"""Small functions on poses: the difference of two, the straight line between two, random ones."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
-
-def rotation_vector(R: np.ndarray) -> np.ndarray:
-    """Logarithm of a rotation: unit axis times angle.
-
-    Args:
-        R: rotation matrix R_AB, (3, 3).
-
-    Returns:
-        Rotation vector in A, (3,), of length 0..pi (rad).
-    """
-    twice_sine_axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine = 0.5 * float(np.sqrt(twice_sine_axis @ twice_sine_axis))
-    cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
-    angle = float(np.arctan2(sine, cosine))
-    if sine > 1e-6:
-        return twice_sine_axis * (0.5 * angle / sine)
-    if cosine > 0.0:
-        return 0.5 * twice_sine_axis
-    # At half a turn R = 2 a a^T - I: the axis is the largest column of (R + I) / 2, normalized.
-    aaT = 0.5 * (R + np.eye(3))
-    column = aaT[:, int(np.argmax(np.diag(aaT)))]
-    return column * (angle / float(np.linalg.norm(column)))
+from prehensile.kinematics.rotations import log_so3, random_rotation
+from prehensile.kinematics.spatial import Array, log_se3
 
 
 def pose_error(X_WA: RigidTransform, X_WB: RigidTransform) -> np.ndarray:
     """The motion that takes frame A to frame B, in the order of a spatial velocity.
+
+    Its two halves do not mix: it is the velocity V_WA_W with which A's origin moves straight to
+    B's while A turns about one axis, in one second. That is the error to drive to zero with
+    J_V_WA. The twist of the screw motion from A to B is :func:`twist_error`.
 
     Returns:
         (6,): rotation vector of R_AB expressed in W (rad), then p_AB_W (m).
@@ -37,7 +22,7 @@ def pose_error(X_WA: RigidTransform, X_WB: RigidTransform) -> np.ndarray:
     R_WA = X_WA.rotation().matrix()
     R_WB = X_WB.rotation().matrix()
     error = np.empty(6)
-    error[:3] = rotation_vector(R_WB @ R_WA.T)
+    error[:3] = log_so3(R_WB @ R_WA.T)
     error[3:] = X_WB.translation() - X_WA.translation()
     return error
 
@@ -46,6 +31,18 @@ def pose_distance(X_WA: RigidTransform, X_WB: RigidTransform) -> tuple[float, fl
     """Distance of the origins (m) and angle of the rotation (rad) between two poses."""
     error = pose_error(X_WA, X_WB)
     return float(np.linalg.norm(error[3:])), float(np.linalg.norm(error[:3]))
+
+
+def twist_error(X_WA: RigidTransform, X_WB: RigidTransform) -> Array:
+    """The constant twist that carries frame A to frame B in one second: log(X_AB).
+
+    Does not depend on W. Expressed in A, and, as the motion is a screw about an axis fixed in A, in
+    B just the same (the body form). ``adjoint(X_WA) @ twist`` is the space form.
+
+    Returns:
+        (6,): [w; v] in rad and m.
+    """
+    return log_se3(X_WA.inverse() @ X_WB)
 
 
 def straight_line(
@@ -71,3 +68,18 @@ def straight_line(
         poses.append(RigidTransform(RotationMatrix(q_A.slerp(u, q_B)), (1.0 - u) * p_A + u * p_B))
     poses.append(X_WB)
     return poses
+
+
+def random_pose(
+    rng: np.random.Generator, lower: ArrayLike = (-1, -1, -1), upper: ArrayLike = (1, 1, 1)
+) -> RigidTransform:
+    """A pose with a uniformly random orientation and its origin uniformly in a box.
+
+    Args:
+        rng: source of the randomness.
+        lower: (3,) corner of the box, in m.
+        upper: (3,) opposite corner, not below ``lower``.
+    """
+    return RigidTransform(
+        random_rotation(rng), rng.uniform(np.asarray(lower, float), np.asarray(upper, float))
+    )
