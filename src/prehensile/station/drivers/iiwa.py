@@ -57,6 +57,10 @@ def _check(site: Site) -> IiwaControlMode:
         )
     if config.desired_kp_gains is not None and not position_enabled(mode):
         site.fail("torque_only has no position gains", "leave them out", "desired_kp_gains")
+    n = site.plant.num_positions(site.instance)
+    if config.desired_kp_gains is not None and len(config.desired_kp_gains) != n:
+        message = f"{len(config.desired_kp_gains)} gains stand where {n} joints move"
+        site.fail(message, "give each joint one", "desired_kp_gains")
     return mode
 
 
@@ -79,6 +83,10 @@ def _simulate(site: Site) -> None:
         config.desired_kp_gains = np.full(n, _POSITION_GAIN)
     # The arm's own model of itself: whatever is bolted to it counts as one rigid piece.
     controller_plant = make_robot_plant(site.scenario, [site.name], frozen_children=True)
+    if controller_plant.num_positions() != n:
+        site.fail(
+            "the model stands on joints of another", "drive an arm that is fixed to the world"
+        )
     builder.AddNamedSystem(f"{site.name}.controller_plant", SharedPointerSystem(controller_plant))
     driver = SimIiwaDriver.AddToBuilder(
         builder=builder,
