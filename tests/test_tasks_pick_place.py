@@ -7,16 +7,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
+from prehensile.behavior.trajectory_player import SegmentPlayer
 from prehensile.planning.arm import ArmModel
 from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario_file import load_scenario
-from prehensile.tasks.pick_place import (
-    X_BrickG,
-    choose_poses,
-    plan_pick_place,
-    run_demo,
-    run_pick_place,
-)
+from prehensile.tasks.pick_place import TripPlan, X_BrickG, choose_poses, plan_pick_place
+from prehensile.tasks.pick_place_run import run_demo, run_pick_place
 
 
 def brick(x: float, y: float, yaw_degrees: float) -> RigidTransform:
@@ -46,26 +42,41 @@ def test_poses_are_on_the_table_apart_and_repeatable():
             np.testing.assert_allclose(X_WBrick.rotation().col(2), [0.0, 0.0, 1.0], atol=1e-12)
 
 
+def motions(plan: TripPlan) -> list[SegmentPlayer]:
+    assert plan.carry is not None, plan.reason
+    assert plan.release is not None
+    return [plan.carry, plan.release]
+
+
 def test_every_start_and_goal_has_a_plan_of_few_seconds(arm):
     for seed in range(20):
-        sequence, reason = plan_pick_place(arm, *choose_poses(seed), seed=seed)
-        assert sequence is not None, reason
-        assert sequence.duration < 9.0
-        q_first, width, _ = sequence.command(0.0)
-        np.testing.assert_array_equal(q_first, arm.q_default)
-        q_last, _, done = sequence.command(sequence.duration)
+        carry, release = motions(plan_pick_place(arm, *choose_poses(seed), seed=seed))
+        assert carry.duration + release.duration < 10.0
+        np.testing.assert_array_equal(carry.command(0.0)[0], arm.q_default)
+        q_last, width, done = release.command(release.duration)
         assert done
         np.testing.assert_allclose(q_last, arm.q_default, atol=1e-9)
         assert width == pytest.approx(0.1)
 
 
+def test_joint_limits_are_kept_all_the_way(arm):
+    h = 0.005
+    limits = arm.limits
+    for seed in range(5):
+        for motion in motions(plan_pick_place(arm, *choose_poses(seed), seed=seed)):
+            q = np.array([motion.command(t)[0] for t in np.arange(0.0, motion.duration, h)])
+            v = np.diff(q, axis=0) / h
+            assert limits.contain(q)
+            assert np.all(np.abs(v) <= limits.velocity)
+            assert np.all(np.abs(np.diff(v, axis=0) / h) <= limits.acceleration * 1.001)
+
+
 def test_same_seed_same_plan(arm):
     poses = brick(0.5, -0.2, 30.0), brick(0.45, 0.25, -70.0)
-    a, b = (plan_pick_place(arm, *poses, seed=4)[0] for _ in range(2))
-    assert a is not None
-    assert b is not None
-    for t in np.linspace(0.0, a.duration, 50):
-        np.testing.assert_array_equal(a.command(t)[0], b.command(t)[0])
+    plans = [motions(plan_pick_place(arm, *poses, seed=4)) for _ in range(2)]
+    for a, b in zip(*plans, strict=True):
+        for t in np.linspace(0.0, a.duration, 50):
+            np.testing.assert_array_equal(a.command(t)[0], b.command(t)[0])
 
 
 def test_a_goal_out_of_reach_is_said_and_nothing_moves():
@@ -77,15 +88,25 @@ def test_a_goal_out_of_reach_is_said_and_nothing_moves():
     json.dumps(report.to_json(), allow_nan=False)
 
 
-def test_the_brick_ends_at_its_goal():
-    report = run_pick_place(brick(0.5, -0.2, 30.0), brick(0.45, 0.25, -70.0))
+def angle_between(X_WA: RigidTransform, X_WB: RigidTransform) -> float:
+    """Independent of the report's own arithmetic."""
+    R = X_WA.rotation().matrix().T @ X_WB.rotation().matrix()
+    return math.degrees(math.acos(min(1.0, (np.trace(R) - 1.0) / 2.0)))
+
+
+def test_the_brick_goes_there_and_back():
+    start, goal = brick(0.5, -0.2, 30.0), brick(0.45, 0.25, -70.0)
+    report = run_pick_place(start, goal, trips=2)
     assert not report.reason
-    # Independent of the report's own arithmetic.
-    offset = report.X_WEnd.translation() - report.X_WGoal.translation()
-    assert np.linalg.norm(offset) < 0.01
-    R = report.X_WEnd.rotation().matrix().T @ report.X_WGoal.rotation().matrix()
-    assert math.degrees(math.acos(min(1.0, (np.trace(R) - 1.0) / 2.0))) < 3.0
+    assert len(report.trips) == 2
+    for trip, wanted in zip(report.trips, (goal, start), strict=True):
+        assert trip.X_WGoal.IsExactlyEqualTo(wanted)
+        assert np.linalg.norm(trip.X_WEnd.translation() - wanted.translation()) < 0.01
+        assert angle_between(trip.X_WEnd, wanted) < 3.0
+        assert trip.gripper_error[0] < 0.002
+        assert trip.gripper_error[1] < math.radians(1.0)
     assert report.success
+    assert report.trips[1].X_WStart.IsExactlyEqualTo(report.trips[0].X_WEnd)
 
 
 @pytest.mark.slow
@@ -95,8 +116,20 @@ def test_the_brick_ends_at_its_goal_at_every_yaw(yaw):
     start = brick(0.5 + 0.06 * math.cos(angle), -0.2 + 0.06 * math.sin(angle), yaw)
     report = run_pick_place(start, brick(0.5, 0.22, 3 * yaw + 10.0), seed=yaw % 7)
     assert report.success, report.reason
-    assert report.position_error < 0.005
-    assert report.angle_error < math.radians(1.5)
+    distance, angle = report.worst()
+    assert distance < 0.005
+    assert angle < math.radians(1.5)
+
+
+@pytest.mark.slow
+def test_ten_times_there_and_back_without_drift():
+    report = run_pick_place(brick(0.55, -0.3, 110.0), brick(0.42, 0.4, -20.0), trips=20, seed=3)
+    assert report.success, report.reason
+    assert report.worst(of_gripper=True)[0] < 0.002
+    first, last = (
+        max(trip.error[0] for trip in report.trips[part]) for part in (slice(0, 4), slice(-4, None))
+    )
+    assert last < first + 0.001
 
 
 @pytest.mark.slow
@@ -105,5 +138,5 @@ def test_demo_leaves_a_report_and_a_replay(tmp_path):
     assert report.success
     written = json.loads((tmp_path / "out" / "report.json").read_text())
     assert written["success"] is True
-    assert written["position_error_mm"] == pytest.approx(1e3 * report.position_error)
+    assert written["worst_brick_error"]["mm"] == pytest.approx(1e3 * report.worst()[0])
     assert (tmp_path / "out" / "replay.html").stat().st_size > 100_000

@@ -16,6 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_common(clear_bin)
     clear_bin.set_defaults(start=_clear_bin)
     pick_place = demos.add_parser("pick-place", help="an arm moves a brick whose pose is known")
+    pick_place.add_argument(
+        "--trips", type=int, default=1, help="there, back, there ... (default 1)"
+    )
     _add_common(pick_place)
     pick_place.set_defaults(start=_pick_place)
 
@@ -56,10 +59,13 @@ def _clear_bin(args: argparse.Namespace) -> int:
 
 def _pick_place(args: argparse.Namespace) -> int:
     _check_seed(args.seed)
-    from prehensile.tasks.pick_place import run_demo
+    if args.trips < 1:
+        raise InputError(Finding("must be at least 1", key="--trips"))
+    from prehensile.tasks.pick_place_run import run_demo
 
     report = run_demo(
         seed=args.seed,
+        trips=args.trips,
         browser=not args.no_browser,
         out=args.out or Path("prehensile-out/pick-place"),
     )
