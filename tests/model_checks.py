@@ -55,7 +55,7 @@ class Scene:
             others = self.query.ComputeSignedDistanceToPoint(X_WB @ p_BN)
             if all(h.id_G in shapes or h.distance > 0.003 for h in others):
                 points.append(p_BN)
-        return np.array(points)
+        return np.array(points).reshape(-1, 3)
 
 
 def scene(name: str, *, weld: str | None = None, time_step: float = 0.002) -> Scene:

@@ -8,6 +8,7 @@ from pydrake.geometry import Role
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import PdControllerGains
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 
@@ -74,6 +75,7 @@ class Bench:
         *,
         brick: bool = False,
         time_step: float = 0.004,
+        gains: PdControllerGains | None = None,
     ) -> None:
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
@@ -91,6 +93,8 @@ class Bench:
         if brick:
             (instance,) = parser.AddModelsFromUrl(find_model("foam_brick").url)
             self.brick = self.plant.get_body(self.plant.GetBodyIndices(instance)[0])
+        for index in self.plant.GetJointActuatorIndices() if gains else ():
+            self.plant.get_joint_actuator(index).set_controller_gains(gains)
         self.plant.Finalize()
         self.simulator = Simulator(builder.Build())
         self.root = self.simulator.get_mutable_context()
@@ -177,3 +181,102 @@ class TestPandaHand:
             assert mine.velocity_upper_limits() == other.velocity_upper_limits()
         mine, other = (p.GetBodyByName("panda_hand").default_spatial_inertia() for p in (a, b))
         np.testing.assert_allclose(mine.CopyToFullMatrix6(), other.CopyToFullMatrix6(), atol=1e-9)
+
+
+SIDES = ("right", "left")
+TIPS = [f"link_{i}_tip" for i in (3, 7, 11, 15)]
+OPEN = np.where(np.arange(16) == 12, 0.3, 0.0)
+FIST = np.array([0.0, 1.2, 1.2, 0.9] * 3 + [1.3, 0.4, 0.5, 0.8])
+
+
+class TestAllegro:
+    @needs_drake_models
+    @pytest.mark.parametrize("side", SIDES)
+    def test_frames_and_limits_are_drakes(self, side: str) -> None:
+        file = f"allegro_hand_description/sdf/allegro_hand_description_{side}.sdf"
+        a, b = ours(f"allegro_{side}", "hand_root"), theirs(file, "hand_root")
+        # Theirs gives pi to five and axes to six digits.
+        assert_same_frames(a, b, [f"link_{i}" for i in range(16)], atol=1e-5)
+        for i in range(16):
+            mine, other = a.GetJointByName(f"joint_{i}"), b.GetJointByName(f"joint_{i}")
+            assert mine.position_lower_limits() == other.position_lower_limits()
+            assert mine.position_upper_limits() == other.position_upper_limits()
+            assert mine.default_damping() == other.default_damping()
+            assert a.GetJointActuatorByName(f"joint_{i}").effort_limit() == 0.7
+
+    @needs_drake_models
+    @pytest.mark.parametrize("side", SIDES)
+    def test_masses_are_drakes_and_moments_about_the_same_points(self, side: str) -> None:
+        file = f"allegro_hand_description/sdf/allegro_hand_description_{side}.sdf"
+        a, b = ours(f"allegro_{side}", "hand_root"), theirs(file, "hand_root")
+        for name in ["hand_root", *(f"link_{i}" for i in (0, 1, 2, 3, 14))]:
+            mine, other = (p.GetBodyByName(name).default_spatial_inertia() for p in (a, b))
+            assert mine.get_mass() == pytest.approx(other.get_mass(), abs=1e-12)
+            # Theirs, found from the meshes, is about the frame's origin, though the file says
+            # that it is about the centre of mass, which it puts there.
+            np.testing.assert_array_equal(other.get_com(), 0.0)
+            moments = [
+                np.diag(M.CalcRotationalInertia().CopyToFullMatrix3()) for M in (mine, other)
+            ]
+            np.testing.assert_allclose(*moments, rtol=0.5)
+
+    def test_the_left_hand_is_the_right_one_in_a_mirror(self) -> None:
+        right, left = (Bench(f"allegro_{side}", "hand_root") for side in SIDES)
+        rng = np.random.default_rng(2)
+        for _ in range(20):
+            limits = right.plant.GetPositionLowerLimits(), right.plant.GetPositionUpperLimits()
+            q = rng.uniform(*limits)
+            for bench in (right, left):
+                bench.plant.SetPositions(bench.context, q)
+            for tip in TIPS:
+                p = right.pose(tip).translation() * [1.0, -1.0, 1.0]
+                np.testing.assert_allclose(left.pose(tip).translation(), p, atol=1e-9)
+            com = [b.plant.CalcCenterOfMassPositionInWorld(b.context) for b in (right, left)]
+            np.testing.assert_allclose(com[0] * [1.0, -1.0, 1.0], com[1], atol=1e-8)
+
+    @pytest.mark.parametrize("side", SIDES)
+    def test_bends_to_the_palm_and_thumb_meets_fingers(self, side: str) -> None:
+        bench = Bench(f"allegro_{side}", "hand_root")
+        bench.plant.SetPositions(bench.context, FIST)
+        tips = np.array([bench.pose(tip).translation() for tip in TIPS])
+        assert (tips[:, 0] > 0.02).all()  # before the palm
+        assert (tips[:3, 2] < 0.11).all()  # bent down again
+        thumb = tips[3]
+        assert np.linalg.norm(tips[:3] - thumb, axis=1).min() < 0.07
+
+    @pytest.mark.parametrize("side", SIDES)
+    def test_open_hand_is_clear_of_itself(self, side: str) -> None:
+        bench = Bench(f"allegro_{side}", "hand_root")
+        for q in (OPEN, 0.5 * (OPEN + FIST)):
+            bench.plant.SetPositions(bench.context, q)
+            query = bench.plant.get_geometry_query_input_port().Eval(bench.context)
+            assert not query.HasCollisions()
+
+    @pytest.mark.parametrize("side", SIDES)
+    def test_follows_targets(self, side: str) -> None:
+        bench = Bench(f"allegro_{side}", "hand_root", gains=PdControllerGains(p=3.0, d=0.1))
+        bench.plant.SetPositions(bench.context, OPEN)
+        target = bench.plant.get_desired_state_input_port(bench.hand)
+        duration, goal = 0.6, 0.5 * (OPEN + FIST)
+        for step in range(31):
+            s = min(1.0, step * 0.025 / duration)
+            q, v = OPEN + s * (goal - OPEN), (goal - OPEN) / duration * (s < 1.0)
+            target.FixValue(bench.context, np.r_[q, v])
+            bench.simulator.AdvanceTo(0.025 * (step + 1))
+            assert np.abs(bench.plant.GetPositions(bench.context) - q).max() < 0.08
+        bench.simulator.AdvanceTo(1.2)
+        # What is left is the fingers' weight on springs of 3 N m/rad.
+        np.testing.assert_allclose(bench.plant.GetPositions(bench.context), goal, atol=0.03)
+        assert np.abs(bench.plant.GetVelocities(bench.context)).max() < 1e-2
+
+    def test_falls_limp_without_flying_off(self) -> None:
+        # From the default configuration, where the thumb is outside of its limits.
+        fingers_down = RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), [0.0, 0.0, 0.5])
+        bench = Bench("allegro_right", "hand_root", fingers_down)
+        bench.push([0.0] * 16)
+        for step in range(20):
+            bench.simulator.AdvanceTo(0.05 * (step + 1))
+            assert np.abs(bench.plant.GetVelocities(bench.context)).max() < 15.0
+        q = bench.plant.GetPositions(bench.context)
+        assert (q > bench.plant.GetPositionLowerLimits() - 0.02).all()
+        assert (q < bench.plant.GetPositionUpperLimits() + 0.02).all()

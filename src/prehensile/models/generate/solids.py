@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.multibody.tree import RotationalInertia, SpatialInertia
 
 from prehensile.models.generate.sdf_model import Inertial, Pose, Shape
 from prehensile.models.generate.sphere_cover import transform
@@ -47,8 +47,24 @@ def body(mass: float, parts: Sequence[tuple[Shape, Pose]]) -> Inertial:
     M = SpatialInertia.Zero()
     for shape, pose in parts:
         M += solid(shape, mass * volume(shape) / total, transform(pose))
+    return _inertial(M)
+
+
+def assembly(bodies: Sequence[Inertial]) -> Inertial:
+    """Mass properties of bodies that are fixed to one another, all given in one frame."""
+    M = SpatialInertia.Zero()
+    for part in bodies:
+        ixx, iyy, izz, ixy, ixz, iyz = part.inertia
+        about_com = RotationalInertia(ixx, iyy, izz, ixy, ixz, iyz)
+        M += SpatialInertia.MakeFromCentralInertia(part.mass, part.com, about_com)
+    return _inertial(M)
+
+
+def _inertial(M: SpatialInertia) -> Inertial:
+    """The same mass properties with the inertia about the centre of mass, rounded."""
     com = M.get_com()
     inertia = M.Shift(com).CalcRotationalInertia().CopyToFullMatrix3()
     ixx, iyy, izz = np.round(np.diag(inertia), 10)
     ixy, ixz, iyz = np.round([inertia[0, 1], inertia[0, 2], inertia[1, 2]], 10)
+    mass = round(M.get_mass(), 9)
     return Inertial(mass, tuple(np.round(com, 8)), (ixx, iyy, izz, ixy, ixz, iyz))
