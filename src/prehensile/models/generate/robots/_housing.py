@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from prehensile.models.shapes import Material, Mesh, Part, cylinder
-from prehensile.models.shapes.implicit import Field, polygonize, split
+from prehensile.models.shapes.implicit import Field, drum, polygonize, split
 
 GAP = 0.0016
 """Half of what is between two links, m."""
@@ -42,9 +43,17 @@ def divided(mesh: Mesh, body: Field, plane: Plane) -> tuple[Mesh, Mesh]:
     return inner, outer
 
 
-def disc(
-    radius: float, start: Sequence[float], end: Sequence[float], rounding: float = 0.0
+def without(
+    mesh: Mesh, body: Field, start: Sequence[float], end: Sequence[float], radius: float
 ) -> Mesh:
+    """What of the surface of a body lies outside a cylinder, where the next link turns."""
+    outer = split(mesh, drum(start, end, radius + 0.0005, 0.0), body)[1]
+    if outer is None:
+        raise ValueError("radius: the cylinder holds the whole housing")
+    return outer
+
+
+def disc(radius: float, start: ArrayLike, end: ArrayLike, rounding: float = 0.0) -> Mesh:
     """A cylinder between two points of a link, its rims rounded."""
     a, b = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(b - a))
@@ -55,7 +64,7 @@ def disc(
     return cylinder(radius, length, rounding=rounding).transformed(R, 0.5 * (a + b))
 
 
-def ring(radius: float, at: Sequence[float], axis: int) -> Part:
+def ring(radius: float, at: ArrayLike, axis: int) -> Part:
     """The dark ring in the gap at a joint."""
     half = 0.006 * np.eye(3)[axis]
     return Part(disc(radius - 0.0015, np.asarray(at) - half, np.asarray(at) + half), DARK)
