@@ -10,7 +10,7 @@ WHITE = Material("white", (0.97, 0.97, 0.97, 1.0), metallic=0.0, roughness=0.4)
 GREY = Material("grey", (0.26, 0.27, 0.28, 1.0), metallic=0.0, roughness=0.5)
 STEEL = Material("steel", (0.62, 0.63, 0.64, 1.0), metallic=0.2, roughness=0.4)
 
-STEP = 0.0098  # m, edge of the triangles
+STEP = 0.0104  # m, edge of the triangles
 R = 0.055  # m, radius of tubes and drums
 X, Y, Z = np.eye(3)
 
@@ -30,10 +30,8 @@ def base() -> list[Part]:
         drum((0, 0, -0.06), (0, 0, 0.2), R, 0.01),
         blend=0.045,
     )
-    body = cut(body, lambda p: p[..., 2], blend=0.0)
-    mesh = kept(
-        shell(body, (-0.16, -0.12, -0.01), (0.1, 0.12, 0.2), STEP), body, (2, 0.14 - GAP, -1.0)
-    )
+    mesh = shell(body, (-0.16, -0.12, -0.07), (0.1, 0.12, 0.2), STEP)
+    mesh = kept(mesh, body, (2, 0.0, 1.0), (2, 0.14 - GAP, -1.0))
     spots = (-0.035, 0.0, 0.035)
     plugs = [disc(0.012, (-0.12, y, 0.045), (-0.136, y, 0.045), 0.002) for y in spots]
     return [
@@ -117,7 +115,7 @@ def flange() -> list[Part]:
         cone((0.02, 0.02, 0.08), (0.045, 0.045, 0.084), 0.014, 0.012),
         blend=0.02,
     )
-    mesh = shell(body, (-0.05, -0.05, low - 0.04), (0.09, 0.09, 0.11), 0.006)
+    mesh = shell(body, (-0.05, -0.05, low - 0.04), (0.09, 0.09, 0.11), 0.0072)
     mesh = kept(mesh, body, (2, low, 1.0))
     face = lathe(
         [(0.0315, 0.09), (0.0315, high - 0.001), (0.0305, high), (0.021, high), (0.021, 0.1)],
