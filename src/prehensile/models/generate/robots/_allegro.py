@@ -7,7 +7,6 @@ fingers, its second turns it. The left hand is the right one seen in a mirror, a
 mean the same on both.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -226,7 +225,7 @@ def model(name: str, side: int) -> Model:
     )
 
 
-def _meshes(side: int) -> dict[str, Sequence[Part]]:
+def _meshes(side: int) -> dict[str, list[Part]]:
     roots = [SEGMENTS[i].X_PL for i in (0, 4, 8)]
     meshes = {
         "palm": _allegro_shape.palm([(X.rotation().matrix(), X.translation()) for X in roots])
