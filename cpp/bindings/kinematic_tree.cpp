@@ -136,6 +136,16 @@ nb::object Jacobians(const KinematicTree& tree, nb::handle q, int frame, int num
   return J.Take();
 }
 
+nb::tuple ReachOf(const KinematicTree& tree, int frame, nb::handle lower, nb::handle upper) {
+  const ArrayArgument low(lower, "lower"), high(upper, "upper");
+  low.RequireShape({tree.num_joints()});
+  high.RequireShape({tree.num_joints()});
+  RequireFrame(tree, frame, "frame");
+  const KinematicTree::Ball ball = tree.ReachOf(frame, low.data(), high.data());
+  return nb::make_tuple(nb::make_tuple(ball.center[0], ball.center[1], ball.center[2]),
+                        ball.radius);
+}
+
 }  // namespace
 
 void BindKinematicTree(nb::module_& m) {
@@ -150,7 +160,8 @@ void BindKinematicTree(nb::module_& m) {
       .def("relative_jacobian", &RelativeJacobian, "q"_a, "frame"_a, "measured_in"_a,
            "expressed_in"_a)
       .def("poses", &Poses, "Q"_a, "frame"_a = 0, "num_threads"_a = 1)
-      .def("jacobians", &Jacobians, "Q"_a, "frame"_a = 0, "num_threads"_a = 1);
+      .def("jacobians", &Jacobians, "Q"_a, "frame"_a = 0, "num_threads"_a = 1)
+      .def("reach", &ReachOf, "frame"_a, "lower"_a, "upper"_a);
 }
 
 }  // namespace prehensile

@@ -6,6 +6,7 @@
 NB_MODULE(_core, m) {
   prehensile::BindVoxelDownsample(m);
   prehensile::BindKinematicTree(m);
+  prehensile::BindReachability(m);
   prehensile::BindDifferentialIk(m);
   prehensile::BindAnalyticIk(m);
 }

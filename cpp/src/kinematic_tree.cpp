@@ -244,4 +244,20 @@ void KinematicTree::PosesAndJacobians(const double* Q, std::size_t N, int frame,
   });
 }
 
+KinematicTree::Ball KinematicTree::ReachOf(int frame, const double* lower,
+                                           const double* upper) const {
+  const Chain& chain = frames_[frame];
+  const auto length = [](const std::array<double, 3>& p) { return std::hypot(p[0], p[1], p[2]); };
+  if (chain.steps.empty()) return {chain.p_LF, 0};
+  // About the first joint's origin, by the lengths of everything that follows.
+  Ball ball{chain.steps.front().p_PL, length(chain.p_LF) - length(chain.steps.front().p_PL)};
+  for (const Step& step : chain.steps) {
+    ball.radius += length(step.p_PL);
+    if (step.prismatic) {
+      ball.radius += std::max(std::abs(lower[step.joint]), std::abs(upper[step.joint]));
+    }
+  }
+  return ball;
+}
+
 }  // namespace prehensile

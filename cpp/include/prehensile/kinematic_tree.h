@@ -68,6 +68,15 @@ class KinematicTree {
   void PosesAndJacobians(const double* Q, std::size_t N, int frame, double* X, double* J,
                          int num_threads) const;
 
+  /// A ball that a frame's origin never leaves while all joints are within their limits.
+  struct Ball {
+    std::array<double, 3> center;  // In W.
+    double radius;
+  };
+
+  /// @param lower, upper n joint limits each; only those of prismatic joints matter.
+  Ball ReachOf(int frame, const double* lower, const double* upper) const;
+
  private:
   /// One joint on the way from W to a frame, in a frame L of its own whose z is the axis.
   struct Step {

@@ -1,5 +1,7 @@
 """Signatures of the compiled module (cpp/bindings/module.cpp)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -55,3 +57,32 @@ class KinematicTree:
         """(N, 4, 4) poses for the rows of Q (N, n); the GIL is released."""
     def jacobians(self, Q: ArrayLike, frame: int = 0, num_threads: int = 1) -> NDArray[np.float64]:
         """(N, 6, n) Jacobians for the rows of Q (N, n); the GIL is released."""
+    def reach(
+        self, frame: int, lower: ArrayLike, upper: ArrayLike
+    ) -> tuple[tuple[float, float, float], float]:
+        """Centre (in W) and radius of a ball that F's origin does not leave within the limits."""
+
+def sample_configurations(
+    lower: Sequence[float],
+    upper: Sequence[float],
+    seed: int,
+    first: int,
+    count: int,
+    num_threads: int,
+) -> NDArray[np.float64]: ...
+def add_to_reach(
+    tree: KinematicTree,
+    frame: int,
+    Q: ArrayLike,
+    axis: Sequence[float],
+    directions: ArrayLike,
+    part: str,
+    length: float,
+    voxel_size: float,
+    first: Sequence[int],
+    counts: NDArray[np.uint32],
+    reached: NDArray[np.uint64],
+    manipulability: NDArray[np.float64],
+    singular_value: NDArray[np.float64],
+    num_threads: int,
+) -> int: ...
