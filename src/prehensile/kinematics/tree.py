@@ -24,6 +24,7 @@ class PlantTree:
         frames: names of the frames, in their order.
         position_indices: (n,) where the joints' positions are in the plant's q.
         velocity_indices: (n,) where their velocities are in the plant's v.
+        prismatic: (n,) whether it slides (m) instead of turning (rad).
         lower, upper: (n,) position limits (rad or m), infinite where there is none.
         velocity: (n,) largest speed (rad/s or m/s): the smaller of the two directions' limits.
         acceleration: (n,) largest acceleration (rad/s² or m/s²), likewise.
@@ -34,6 +35,7 @@ class PlantTree:
     frames: tuple[str, ...]
     position_indices: NDArray[np.intp]
     velocity_indices: NDArray[np.intp]
+    prismatic: NDArray[np.bool_]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     velocity: NDArray[np.float64]
@@ -113,11 +115,12 @@ def tree_from_plant(
         (X_WL[parent].inverse() @ frame.CalcPoseInWorld(context)).GetAsMatrix4()
         for parent, frame in zip(frame_parents, frames, strict=True)
     ]
+    prismatic = np.array([isinstance(joint, PrismaticJoint) for joint in joints], dtype=bool)
     tree = KinematicTree(
         parents,
         X_PJ,
         axes,
-        np.array([isinstance(joint, PrismaticJoint) for joint in joints], dtype=float),
+        prismatic.astype(float),
         frame_parents,
         np.reshape(X_PF, (-1, 4, 4)),
     )
@@ -138,6 +141,7 @@ def tree_from_plant(
         frames=tuple(frame.name() for frame in frames),
         position_indices=position_indices,
         velocity_indices=np.array([j.velocity_start() for j in joints], dtype=np.intp),
+        prismatic=prismatic,
         lower=position[0],
         upper=position[1],
         velocity=largest("velocity_lower_limits", "velocity_upper_limits"),
