@@ -1,7 +1,5 @@
 """What the housings of all arms are made with: shells cut off at the joints, and rings there."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,7 +15,7 @@ Plane = tuple[int, float, float]
 """Axis 0 to 2, a place on it in m, and the sign of the side that is kept."""
 
 
-def shell(body: Field, low: Sequence[float], high: Sequence[float], step: float) -> Mesh:
+def shell(body: Field, low: ArrayLike, high: ArrayLike, step: float) -> Mesh:
     """The surface of a body in a box; the box is widened for the body to lie inside it."""
     margin = 2.0 * step
     return polygonize(body, np.asarray(low) - margin, np.asarray(high) + margin, step)
@@ -43,14 +41,23 @@ def divided(mesh: Mesh, body: Field, plane: Plane) -> tuple[Mesh, Mesh]:
     return inner, outer
 
 
-def without(
-    mesh: Mesh, body: Field, start: Sequence[float], end: Sequence[float], radius: float
-) -> Mesh:
+def parted(
+    mesh: Mesh, body: Field, start: ArrayLike, end: ArrayLike, radius: float
+) -> tuple[Mesh, Mesh]:
+    """The surface of a body inside and outside a cylinder between two points.
+
+    Raises:
+        ValueError: one of the two is empty.
+    """
+    inner, outer = split(mesh, drum(start, end, radius, 0.0), body)
+    if inner is None or outer is None:
+        raise ValueError("radius: the cylinder does not cut the housing")
+    return inner, outer
+
+
+def without(mesh: Mesh, body: Field, start: ArrayLike, end: ArrayLike, radius: float) -> Mesh:
     """What of the surface of a body lies outside a cylinder, where the next link turns."""
-    outer = split(mesh, drum(start, end, radius + 0.0005, 0.0), body)[1]
-    if outer is None:
-        raise ValueError("radius: the cylinder holds the whole housing")
-    return outer
+    return parted(mesh, body, start, end, radius + 0.0005)[1]
 
 
 def disc(radius: float, start: ArrayLike, end: ArrayLike, rounding: float = 0.0) -> Mesh:
