@@ -296,8 +296,8 @@ bool DifferentialIk::Direction(const IkTaskRows& tasks, const LinearRows& constr
   for (int k = 0; k < tasks.num; ++k) {
     double reach = 0.0;
     for (int i = 0; i < n; ++i) {
-      reach += std::abs(tasks.J[k * n + i]) *
-               std::max(std::abs(step->lower[i]), std::abs(step->upper[i]));
+      const double a = std::abs(tasks.J[k * n + i]);
+      if (a > 0.0) reach += a * limits_.velocity[i];
     }
     desired = std::max(desired, std::abs(tasks.V[k]));
     possible = std::max(possible, reach);
