@@ -83,18 +83,18 @@ def find_packages(packages: Mapping[str, str | Path] | None = None) -> dict[str,
     for name, folder in (packages or {}).items():
         add(name, folder, f"packages.{name}")
     for folder in filter(None, os.environ.get(MODEL_PATH_VARIABLE, "").split(os.pathsep)):
-        add(_package_name(Path(folder)), folder, MODEL_PATH_VARIABLE)
+        add(package_name(Path(folder)), folder, MODEL_PATH_VARIABLE)
     if findings:
         raise InputError(*findings)
     for folder in filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)):
         for manifest in sorted(Path(folder).rglob("package.xml")):
-            name = _package_name(manifest.parent)
+            name = package_name(manifest.parent)
             if name != "drake":
                 found.setdefault(name, manifest.parent.absolute())
     if "drake_models" not in found:
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         for manifest in sorted(cache.glob("drake/package_map/*/package.xml")):
-            if _package_name(manifest.parent) == "drake_models":
+            if package_name(manifest.parent) == "drake_models":
                 found["drake_models"] = manifest.parent
     return found
 
@@ -218,7 +218,7 @@ def inside(root: Path, path: Path, said: str) -> Path:
     return Path(os.path.normpath(path.absolute()))
 
 
-def _package_name(folder: Path) -> str:
+def package_name(folder: Path) -> str:
     """The name in a folder's ``package.xml``, else the folder's own name."""
     manifest = folder.expanduser() / "package.xml"
     try:
