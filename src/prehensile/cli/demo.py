@@ -2,8 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from prehensile.errors import Finding, InputError
+
+if TYPE_CHECKING:
+    from prehensile.tasks.gallery import Show
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -13,14 +17,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "clear-bin", help="an arm clears a bin of objects it has never met into a second one"
     )
     clear_bin.add_argument("--objects", type=int, default=10, help="how many (default 10)")
+    _add_seed(clear_bin)
     _add_common(clear_bin)
     clear_bin.set_defaults(start=_clear_bin)
     pick_place = demos.add_parser("pick-place", help="an arm moves a brick whose pose is known")
     pick_place.add_argument(
         "--trips", type=int, default=1, help="there, back, there ... (default 1)"
     )
+    _add_seed(pick_place)
     _add_common(pick_place)
     pick_place.set_defaults(start=_pick_place)
+    arms = demos.add_parser("arms", help="every arm of the gallery holds still and follows")
+    arms.add_argument(
+        "--controller", choices=_CONTROLLERS, default=_CONTROLLERS[0],
+        help=f"of all arms (default {_CONTROLLERS[0]})",
+    )  # fmt: skip
+    _add_models(arms)
+    _add_common(arms)
+    arms.set_defaults(start=_arms)
+    hands = demos.add_parser("hands", help="every hand of the gallery closes, opens and waves")
+    _add_models(hands)
+    _add_common(hands)
+    hands.set_defaults(start=_hands)
+
+
+# As in prehensile.control.joint_controller, which would import Drake.
+_CONTROLLERS = ("inverse-dynamics", "gravity-compensation", "pid", "stiffness")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,7 +51,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=0, help="of every random choice (default 0)")
     parser.add_argument(
         "--out", type=Path, help="folder of report and replay (default prehensile-out/DEMO)"
     )
@@ -38,6 +59,16 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
     )
+
+
+def _add_models(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--models", nargs="+", metavar="NAME", help="those wanted (default: all in the registry)"
+    )
+
+
+def _add_seed(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="of every random choice (default 0)")
 
 
 def _clear_bin(args: argparse.Namespace) -> int:
@@ -69,6 +100,29 @@ def _pick_place(args: argparse.Namespace) -> int:
         browser=not args.no_browser,
         out=args.out or Path("prehensile-out/pick-place"),
     )
+    return 0 if report.success else 1
+
+
+def _arms(args: argparse.Namespace) -> int:
+    from prehensile.tasks.gallery import arms
+
+    return _gallery(args, arms(args.controller, args.models))
+
+
+def _hands(args: argparse.Namespace) -> int:
+    from prehensile.tasks.gallery import hands
+
+    return _gallery(args, hands(args.models))
+
+
+def _gallery(args: argparse.Namespace, show: "Show") -> int:
+    """Runs a demonstration of the gallery."""
+    from prehensile.tasks.gallery import run_demo
+
+    out = args.out or Path(f"prehensile-out/{args.demo}")
+    report = run_demo(show, args.demo, browser=not args.no_browser, out=out)
+    if report.interrupted:
+        return 130
     return 0 if report.success else 1
 
 
