@@ -149,6 +149,23 @@ def tree_from_plant(
     )
 
 
+def joints_that_move(plant: MultibodyPlant, frame: Frame) -> list[Joint]:
+    """The revolute and prismatic joints between the world and a frame, from the world outward.
+
+    Args:
+        plant: finalized.
+        frame: one of its frames.
+    """
+    into = {outboard: (joint, inboard) for joint, inboard, outboard in _outward(plant)}
+    joints = []
+    body = frame.body().index()
+    while body in into:
+        joint, body = into[body]
+        if isinstance(joint, (RevoluteJoint, PrismaticJoint)):
+            joints.append(joint)
+    return joints[::-1]
+
+
 def _all_joints(plant: MultibodyPlant) -> list[Joint]:
     return [plant.get_joint(index) for index in plant.GetJointIndices()]
 
