@@ -277,15 +277,6 @@ void BindSixJoints(nb::module_& m, const char* name, const char* doc) {
       "q"_a, "The branch of a configuration (6,).");
 }
 
-nb::tuple ToPython(const ArmAngleChoice& choice) {
-  const char* const status = kStatusNames[static_cast<int>(choice.status)];
-  if (choice.status != IkStatus::kSolved) {
-    return nb::make_tuple(nb::none(), nb::none(), nb::none(), status);
-  }
-  return nb::make_tuple(MakeArray(nb::make_tuple(7), Numpy::Get().float64, choice.q.data(), 7),
-                        choice.psi, choice.branch, status);
-}
-
 }  // namespace
 
 void BindAnalyticIk(nb::module_& m) {
@@ -313,6 +304,21 @@ void BindAnalyticIk(nb::module_& m) {
           "or "
           "to the folded arm) or \"limits\" (of the joints).")
       .def("__len__", [](const IkSolutions& self) { return self.count; });
+
+  nb::class_<ArmAngleChoice>(m, "ArmAngleChoice", "A solution chosen among all arm angles.")
+      .def_prop_ro(
+          "q",
+          [](const ArmAngleChoice& self) -> nb::object {
+            if (self.status != IkStatus::kSolved) return nb::none();
+            return MakeArray(nb::make_tuple(7), Numpy::Get().float64, self.q.data(), 7);
+          },
+          "(7,) configuration; None if there is none.")
+      .def_ro("psi", &ArmAngleChoice::psi, "Its arm angle, in [-π, π].")
+      .def_ro("branch", &ArmAngleChoice::branch)
+      .def_prop_ro(
+          "status",
+          [](const ArmAngleChoice& self) { return kStatusNames[static_cast<int>(self.status)]; },
+          "As IkSolutions.status.");
 
   BindSixJoints<UrArm>(m, "UrArm",
                        R"(Arms of six joints whose axes 2, 3 and 4 are parallel.
@@ -413,32 +419,28 @@ Returns:
       .def(
           "closest",
           [](const SrsArm& self, nb::handle X_WG, nb::handle q) {
-            return ToPython(self.Closest(ReadMatrix(X_WG).data(), ReadJoints("q", q, 7).data()));
+            return self.Closest(ReadMatrix(X_WG).data(), ReadJoints("q", q, 7).data());
           },
           "X_WG"_a, "q"_a,
           R"(Of all branches and arm angles within the limits, the configuration closest to q.
 
 In Euclidean distance. Every interval of arm angles is sampled each 0.1 rad or finer and searched on
-around the best sample.
-
-Returns:
-    q (7,), psi, branch, status; the first three None unless status is "solved".)")
+around the best sample. q also decides what joints do that a singular pose leaves free.)")
       .def(
           "farthest_from_limits",
           [](const SrsArm& self, nb::handle X_WG) {
-            return ToPython(self.FarthestFromLimits(ReadMatrix(X_WG).data()));
+            return self.FarthestFromLimits(ReadMatrix(X_WG).data());
           },
           "X_WG"_a,
           R"(The configuration whose joint nearest to a limit is as far from it as can be.
 
-Distance as a fraction of half the joint's range; searched as by closest(), returned likewise.)")
+Distance as a fraction of half the joint's range; searched as by closest().)")
       .def(
           "widest_interval",
           [](const SrsArm& self, nb::handle X_WG) {
-            return ToPython(self.WidestInterval(ReadMatrix(X_WG).data()));
+            return self.WidestInterval(ReadMatrix(X_WG).data());
           },
-          "X_WG"_a,
-          R"(The centre of the widest interval of arm angles of all branches; as closest().)");
+          "X_WG"_a, R"(The centre of the widest interval of arm angles of all branches.)");
 }
 
 }  // namespace prehensile

@@ -1,6 +1,7 @@
 """Signatures of the compiled module (cpp/bindings/module.cpp)."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,3 +87,259 @@ def add_to_reach(
     singular_value: NDArray[np.float64],
     num_threads: int,
 ) -> int: ...
+
+class IkStep:
+    """The next joint velocities, and how they came about.
+
+    Attributes:
+        v: (n,) the velocities (a new array at every access, as the next two).
+        lower, upper: (n,) the interval that limits and state allowed.
+        status: 0 optimal, 1 recovering, 2 relaxed, 3 braking.
+        alpha: part of V achieved in its direction, where that is the formulation; else 1.
+        violation: greatest violation of a linear constraint.
+        iterations: of the solver.
+    """
+
+    @property
+    def v(self) -> NDArray[np.float64]: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+    @property
+    def status(self) -> int: ...
+    @property
+    def alpha(self) -> float: ...
+    @property
+    def violation(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+
+class DifferentialIk:
+    """From joint state and rows J v ≈ V to the next joint velocities.
+
+    All of its methods raise ValueError, naming the argument, for a wrong shape or a number that is
+    not finite (the sides of constraints may be infinite).
+    """
+
+    def __init__(
+        self,
+        position_lower: ArrayLike,
+        position_upper: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        period: float,
+        formulation: int,
+        damping: float,
+        centering: int,
+        centering_weight: float,
+        centering_gain: ArrayLike | None,
+        nominal_position: ArrayLike | None,
+        direction_weight: float,
+        rank_tolerance: float,
+    ) -> None: ...
+    @property
+    def num_joints(self) -> int: ...
+    def step(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        J: ArrayLike,
+        V: ArrayLike,
+        weights: ArrayLike | None = None,
+        level_sizes: list[int] | None = None,
+        A: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> IkStep:
+        """One step from q, v (n,) with J (k, n), V (k,), lower <= A v <= upper, A (m, n)."""
+    def step_batch(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        J: ArrayLike,
+        V: ArrayLike,
+        weights: ArrayLike | None = None,
+        level_sizes: list[int] | None = None,
+        A: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        num_threads: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """The same for N states, every array with a first dimension N (but weights, level_sizes).
+
+        Returns (N, n) velocities and (N,) statuses. The GIL is released.
+        """
+    def velocity_interval(
+        self, q: ArrayLike, v: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], bool]:
+        """Least and greatest next velocities (n,), and whether the state was beyond limits."""
+
+class FrameIk:
+    """From joint state and desired poses or velocities of a tree's frames to joint velocities.
+
+    Args:
+        frames: (m,) number of each task's frame.
+        weights: (m, 6) of its rotational and translational velocities; 0 leaves one free.
+        in_frame: (m,) whether the weights are along the frame's axes rather than the world's.
+        levels: (m,) priorities, the least first.
+        gains: (m,) 1/s, from the difference of two poses to a velocity.
+        max_angular, max_linear: (m,) greatest desired speeds (rad/s, m/s), may be infinite.
+    """
+
+    def __init__(
+        self,
+        tree: KinematicTree,
+        ik: DifferentialIk,
+        frames: ArrayLike,
+        weights: ArrayLike,
+        in_frame: ArrayLike,
+        levels: ArrayLike,
+        gains: ArrayLike,
+        max_angular: ArrayLike,
+        max_linear: ArrayLike,
+    ) -> None: ...
+    @property
+    def num_joints(self) -> int: ...
+    @property
+    def num_tasks(self) -> int: ...
+    def step(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        X_WD: ArrayLike | None = None,
+        V_WD: ArrayLike | None = None,
+        A: ArrayLike | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> IkStep:
+        """One step towards poses (m, 4, 4), with velocities (m, 6) added to what they ask for.
+
+        A single task may leave out the first dimension.
+        """
+    def rollout(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        X_WD: ArrayLike,
+        steps: int,
+        keep_path: bool = False,
+        num_threads: int = 1,
+    ) -> tuple[
+        NDArray[np.float64], NDArray[np.float64], NDArray[np.int32], NDArray[np.float64] | None
+    ]:
+        """N times `steps` steps from q, v (N, n) towards poses (N, m, 4, 4), the GIL released.
+
+        Returns the last q and v, the gravest status of each (N,), and the path (N, steps, n).
+        """
+
+class IkSolutions:
+    @property
+    def q(self) -> NDArray[np.float64]: ...
+    @property
+    def branch(self) -> NDArray[np.uint8]: ...
+    @property
+    def status(self) -> Literal["solved", "too far", "too near", "limits"]: ...
+    def __len__(self) -> int: ...
+
+class ArmAngleChoice:
+    @property
+    def q(self) -> NDArray[np.float64] | None: ...
+    @property
+    def psi(self) -> float: ...
+    @property
+    def branch(self) -> int: ...
+    @property
+    def status(self) -> Literal["solved", "too far", "too near", "limits"]: ...
+
+class UrArm:
+    def __init__(
+        self,
+        axes: NDArray[np.float64],
+        points: NDArray[np.float64],
+        X_WG0: object,
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+        tolerance: float = 1e-6,
+    ) -> None: ...
+    @property
+    def num_joints(self) -> int: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+    def pose(self, q: ArrayLike) -> NDArray[np.float64]: ...
+    def branch(self, q: ArrayLike) -> int: ...
+    def solve(
+        self, X_WG: object, q_near: ArrayLike | None = None, limits: bool = True
+    ) -> IkSolutions: ...
+    def solve_batch(
+        self,
+        X_WG: NDArray[np.float64],
+        q_near: ArrayLike | None = None,
+        limits: bool = True,
+        num_threads: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+
+class PieperArm:
+    def __init__(
+        self,
+        axes: NDArray[np.float64],
+        points: NDArray[np.float64],
+        X_WG0: object,
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+        tolerance: float = 1e-6,
+    ) -> None: ...
+    @property
+    def num_joints(self) -> int: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+    def pose(self, q: ArrayLike) -> NDArray[np.float64]: ...
+    def branch(self, q: ArrayLike) -> int: ...
+    def solve(
+        self, X_WG: object, q_near: ArrayLike | None = None, limits: bool = True
+    ) -> IkSolutions: ...
+    def solve_batch(
+        self,
+        X_WG: NDArray[np.float64],
+        q_near: ArrayLike | None = None,
+        limits: bool = True,
+        num_threads: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+
+class SrsArm:
+    def __init__(
+        self,
+        axes: NDArray[np.float64],
+        points: NDArray[np.float64],
+        X_WG0: object,
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+        tolerance: float = 1e-6,
+    ) -> None: ...
+    @property
+    def num_joints(self) -> int: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+    def pose(self, q: ArrayLike) -> NDArray[np.float64]: ...
+    def arm_angle(self, q: ArrayLike) -> tuple[float, int]: ...
+    def arm_angle_intervals(self, X_WG: object, branch: int) -> NDArray[np.float64]: ...
+    def closest(self, X_WG: object, q: ArrayLike) -> ArmAngleChoice: ...
+    def farthest_from_limits(self, X_WG: object) -> ArmAngleChoice: ...
+    def widest_interval(self, X_WG: object) -> ArmAngleChoice: ...
+    def solve(
+        self, X_WG: object, psi: float, q_near: ArrayLike | None = None, limits: bool = True
+    ) -> IkSolutions: ...
+    def solve_batch(
+        self,
+        X_WG: NDArray[np.float64],
+        psi: NDArray[np.float64],
+        q_near: ArrayLike | None = None,
+        limits: bool = True,
+        num_threads: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
