@@ -9,6 +9,7 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
+    SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, Diagram
@@ -56,16 +57,21 @@ def render(
     """Takes a picture of a diagram's scene as it is in a context.
 
     Args:
-        diagram: holds a SceneGraph named ``scene_graph``, such as a station or a RobotDiagram.
-        context: the diagram's; a renderer is added to it the first time.
+        diagram: holds a SceneGraph, itself or in a diagram within it: a station, a RobotDiagram.
+        context: the diagram's, a root; a renderer is added to it the first time.
         X_WC: pose of the camera's optical frame, see :func:`look_at`.
         width, height: of the picture in pixels.
         fov_y: vertical angle of view in rad.
 
     Returns:
         (height, width, 3) uint8, row 0 on top.
+
+    Raises:
+        ValueError: the diagram has no SceneGraph.
     """
-    scene_graph = diagram.GetSubsystemByName("scene_graph")
+    scene_graph = _find_scene_graph(diagram)
+    if scene_graph is None:
+        raise ValueError("diagram: there is no SceneGraph in it")
     scene_context = scene_graph.GetMyMutableContextFromRoot(context)
     if not scene_graph.HasRenderer(scene_context, _RENDERER):
         light = LightParameter(type="directional", direction=[0.4, 0.5, 1.0], intensity=1.0)
@@ -82,3 +88,11 @@ def render(
         ColorRenderCamera(core, False), scene_graph.world_frame_id(), X_WC
     )
     return as_rgb(image.data)
+
+
+def _find_scene_graph(diagram: Diagram) -> SceneGraph | None:
+    for system in diagram.GetSystems():
+        found = _find_scene_graph(system) if isinstance(system, Diagram) else system
+        if isinstance(found, SceneGraph):
+            return found
+    return None
