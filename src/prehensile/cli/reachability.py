@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 # Choice: what it is, in words.
 _VALUES = {
     "index": "reachability index (share of approach directions)",
-    "manipulability": "largest manipulability",
-    "singular-value": "largest smallest singular value (1/s)",
+    "manipulability": "manipulability at best",
+    "singular-value": "smallest singular value at best (1/s)",
     "count": "configurations",
 }
 
@@ -192,24 +192,26 @@ def _frame(plant: "MultibodyPlant", name: str | None) -> "Frame":
 
 
 def _values(args: argparse.Namespace, reach: "ReachabilityMap") -> "NDArray[np.float64]":
-    """(nx, ny, nz) what the colours tell."""
+    """(nx, ny, nz) what the colours tell; NaN where nothing was reached."""
+    import numpy as np
+
     match args.value:
         case "index":
-            return reach.index()
+            values = reach.index()
         case "manipulability":
-            return reach.manipulability
+            values = reach.manipulability
         case "singular-value":
-            return reach.singular_value
-    return reach.counts.astype(float)
+            values = reach.singular_value
+        case _:
+            values = reach.counts
+    return np.where(reach.counts > 0, values, np.nan)
 
 
 def _picture(args: argparse.Namespace, reach: "ReachabilityMap") -> None:
-    import numpy as np
-
     from prehensile.viz.figures import save_figure
     from prehensile.viz.voxels import plot_slices
 
-    values = np.where(reach.counts > 0, _values(args, reach), np.nan)
+    values = _values(args, reach)
     figure = plot_slices(
         values, reach.first, reach.voxel_size, label=_VALUES[args.value], at=tuple(args.at)
     )
@@ -221,22 +223,21 @@ def _view(args: argparse.Namespace, reach: "ReachabilityMap") -> None:
     """Shows the half of the map behind the cut, until Ctrl-C or the button."""
     import time
 
+    import numpy as np
+
     from prehensile.viz.live import STOP_BUTTON, STOP_KEY
     from prehensile.viz.meshcat import start_meshcat
     from prehensile.viz.voxels import draw_voxels
 
     meshcat = start_meshcat(port=args.port, open_browser=not args.no_browser)
-    centers, at = reach.occupied()
     values = _values(args, reach)
-    limits = (0.0, float(values.max(initial=0.0)))
-    behind = centers[:, 1] <= args.at[0]
     draw_voxels(
         meshcat,
         "reachability",
-        centers[behind],
-        values[tuple(at[behind].T)],
+        values[:, reach.centers()[1] <= args.at[0]],
+        reach.first,
         reach.voxel_size,
-        limits=limits,
+        limits=(0.0, float(np.nanmax(values, initial=0.0))),
     )
     meshcat.AddButton(STOP_BUTTON, STOP_KEY)
     hint = "stop: the Stop button, Escape in the page, or Ctrl-C"

@@ -1,4 +1,4 @@
-"""Drawing a number for each voxel of a box: coloured points on a Meshcat page, slices as plots."""
+"""Drawing a number for each voxel of a box: coloured cubes on a Meshcat page, slices as plots."""
 
 from collections.abc import Sequence
 
@@ -6,37 +6,68 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
-from pydrake.geometry import Meshcat
-from pydrake.perception import BaseField, Fields, PointCloud
+from pydrake.geometry import Meshcat, Rgba, SurfaceTriangle, TriangleSurfaceMesh
 
 _COLORS = "viridis"
+_STEPS = 16
 
 
 def draw_voxels(
     meshcat: Meshcat,
     path: str,
-    centers: ArrayLike,
     values: ArrayLike,
+    first: Sequence[int],
     voxel_size: float,
     *,
     limits: tuple[float, float] | None = None,
 ) -> None:
-    """Puts voxels on a page as points as large as they are, coloured by their values.
+    """Puts voxels on a page as cubes coloured by their values, in sixteen steps.
 
     Args:
         meshcat: the page.
         path: where in its tree; what is there is replaced.
-        centers: (V, 3) in the world, in metres.
-        values: (V,) finite.
+        values: (nx, ny, nz); where it is NaN there is no cube.
+        first: indices in the world of the first voxel: it begins at first · voxel_size.
         voxel_size: edge length (m).
         limits: values at the ends of the colour scale; default: the least and the largest.
+
+    Raises:
+        ValueError: values is not three-dimensional.
     """
-    centers = np.asarray(centers, dtype=float).reshape(-1, 3)
-    fields = Fields(int(BaseField.kXYZs) | int(BaseField.kRGBs))
-    cloud = PointCloud(len(centers), fields)
-    cloud.mutable_xyzs()[:] = centers.T
-    cloud.mutable_rgbs()[:] = (255 * _colors(values, limits)).astype(np.uint8).T
-    meshcat.SetObject(path, cloud, point_size=0.8 * voxel_size)
+    values = _box(values)
+    low, high = limits or _limits(values)
+    shade = np.clip((values - low) / max(high - low, 1e-300) * _STEPS, 0, _STEPS - 1)
+    at, quads = _faces(np.isfinite(values))
+    corners = (quads + np.asarray(first)) * voxel_size
+    step_of_face = shade[tuple(at.T)].astype(int)
+    colors = matplotlib.colormaps[_COLORS](np.linspace(0, 1, _STEPS))
+    meshcat.Delete(path)
+    for step in np.unique(step_of_face):
+        points = corners[step_of_face == step].reshape(-1, 3)
+        triangles = [
+            SurfaceTriangle(k, k + i, k + i + 1) for k in range(0, len(points), 4) for i in (1, 2)
+        ]
+        mesh = TriangleSurfaceMesh(triangles, list(points))
+        meshcat.SetObject(f"{path}/{step}", mesh, Rgba(*colors[step]))
+
+
+def _faces(present: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The faces that voxels do not share: (F, 3) whose, and (F, 4, 3) corners in voxels.
+
+    Corners go counter-clockwise, seen from outside.
+    """
+    padded = np.pad(present, 1)
+    whose, corners = [], []
+    for axis in range(3):
+        across, up = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        square = np.array([np.zeros(3), across, across + up, up])
+        for side in (0, 1):
+            neighbour = np.roll(padded, 1 - 2 * side, axis)[1:-1, 1:-1, 1:-1]
+            at = np.argwhere(present & ~neighbour)
+            face = (square if side else square[::-1]) + side * np.eye(3)[axis]
+            whose.append(at)
+            corners.append(at[:, None] + face)
+    return np.concatenate(whose), np.concatenate(corners)
 
 
 def plot_slices(
@@ -61,17 +92,14 @@ def plot_slices(
     Raises:
         ValueError: values is not three-dimensional.
     """
-    values = np.asarray(values, dtype=float)
-    if values.ndim != 3:
-        raise ValueError(f"values: expected (nx, ny, nz), not {values.shape}")
+    values = _box(values)
     low = np.array(first) * voxel_size
     high = low + np.array(values.shape) * voxel_size
     cut = [
         int(np.clip(np.floor(x / voxel_size) - first[axis], 0, values.shape[axis] - 1))
         for axis, x in zip((1, 2), at, strict=True)
     ]
-    if limits is None:
-        limits = (float(np.nanmin(values, initial=np.inf)), float(np.nanmax(values, initial=0.0)))
+    limits = limits or _limits(values)
     panels = (
         (values[:, cut[0], :], 0, 2, "x", "z", "y", first[1] + cut[0]),
         (values[:, :, cut[1]], 0, 1, "x", "y", "z", first[2] + cut[1]),
@@ -100,10 +128,13 @@ def plot_slices(
     return figure
 
 
-def _colors(values: ArrayLike, limits: tuple[float, float] | None) -> NDArray[np.float64]:
-    """(V, 3) colours 0..1."""
-    values = np.asarray(values, dtype=float)
-    if limits is None:
-        limits = (float(values.min(initial=0.0)), float(values.max(initial=0.0)))
-    span = max(limits[1] - limits[0], 1e-300)
-    return matplotlib.colormaps[_COLORS](np.clip((values - limits[0]) / span, 0, 1))[:, :3]
+def _box(values: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=float)
+    if array.ndim != 3:
+        raise ValueError(f"values: expected (nx, ny, nz), not {array.shape}")
+    return array
+
+
+def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
