@@ -74,10 +74,13 @@ def render(
         raise ValueError("diagram: there is no SceneGraph in it")
     scene_context = scene_graph.GetMyMutableContextFromRoot(context)
     if not scene_graph.HasRenderer(scene_context, _RENDERER):
-        light = LightParameter(type="directional", direction=[0.4, 0.5, 1.0], intensity=1.0)
-        fill = LightParameter(type="directional", direction=[-0.7, -0.3, 0.6], intensity=0.5)
+        # One light where the camera is, and one from above, so that tops and sides differ.
+        front = LightParameter(type="directional", intensity=0.75)
+        above = LightParameter(
+            type="directional", frame="world", direction=[0.3, 0.2, -1.0], intensity=0.75
+        )
         params = RenderEngineVtkParams(
-            default_clear_color=np.array(_BACKGROUND), lights=[light, fill]
+            default_clear_color=np.array(_BACKGROUND), lights=[front, above]
         )
         scene_graph.AddRenderer(scene_context, _RENDERER, MakeRenderEngineVtk(params))
     core = RenderCameraCore(
