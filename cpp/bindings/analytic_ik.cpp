@@ -60,7 +60,14 @@ class Buffer {
 /// numpy's functions, fetched once.
 struct Numpy {
   nb::object empty, asarray, float64, uint8;
+  nb::tuple shapes[2][IkSolutions::kMax + 1];  // Of solutions, for 6 and 7 joints.
+  const nb::tuple& shape(int count, int num_joints) const { return shapes[num_joints - 6][count]; }
   Numpy() {
+    for (int n : {6, 7}) {
+      for (int count = 0; count <= IkSolutions::kMax; ++count) {
+        shapes[n - 6][count] = nb::make_tuple(count, n);
+      }
+    }
     const nb::module_ numpy = nb::module_::import_("numpy");
     empty = numpy.attr("empty");
     asarray = numpy.attr("asarray");
@@ -81,7 +88,10 @@ nb::object AsFloat64(nb::handle values) {
 template <typename T>
 nb::object MakeArray(const nb::object& shape, const nb::object& dtype, const T* values,
                      std::size_t count) {
-  nb::object array = Numpy::Get().empty(shape, dtype);
+  PyObject* const args[] = {shape.ptr(), dtype.ptr()};
+  nb::object array =
+      nb::steal(PyObject_Vectorcall(Numpy::Get().empty.ptr(), args, std::size(args), nullptr));
+  if (!array.is_valid()) throw nb::python_error();
   Py_buffer view;
   if (PyObject_GetBuffer(array.ptr(), &view, PyBUF_CONTIG) != 0) throw nb::python_error();
   std::memcpy(view.buf, values, count * sizeof(T));
@@ -284,7 +294,7 @@ void BindAnalyticIk(nb::module_& m) {
       .def_prop_ro(
           "q",
           [](const IkSolutions& self) {
-            return MakeArray(nb::make_tuple(self.count, self.num_joints), Numpy::Get().float64,
+            return MakeArray(Numpy::Get().shape(self.count, self.num_joints), Numpy::Get().float64,
                              self.q.data(), self.count * self.num_joints);
           },
           "(B, n) a new array, row per solution.")
