@@ -4,6 +4,8 @@
 #include "bindings.h"
 
 NB_MODULE(_core, m) {
+  // Drake keeps Systems written in Python, and what they hold, until the process ends.
+  nanobind::set_leak_warnings(false);
   prehensile::BindVoxelDownsample(m);
   prehensile::BindKinematicTree(m);
   prehensile::BindReachability(m);

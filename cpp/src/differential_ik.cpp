@@ -128,7 +128,7 @@ DifferentialIk::DifferentialIk(JointLimits limits, DifferentialIkOptions options
     Require(limits_.position_lower[i] <= limits_.position_upper[i] &&
                 limits_.position_lower[i] < kInfinity && limits_.position_upper[i] > -kInfinity,
             "limits: a position range is empty");
-    Require(limits_.velocity[i] > 0.0, "limits: a velocity is not positive");
+    Require(limits_.velocity[i] >= 0.0, "limits: a velocity is negative");
     Require(limits_.acceleration[i] > 0.0, "limits: an acceleration is not positive");
   }
   Require(options_.period > 0.0 && options_.period < kInfinity, "period: expected > 0 and finite");
@@ -189,7 +189,18 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
   }
   double relative = 0.0;
   bool solved;
-  if (options_.formulation == IkFormulation::kDirection) {
+  if (options_.formulation == IkFormulation::kSaturated) {
+    double lower[kMaxIkJoints], upper[kMaxIkJoints];
+    std::copy(step->lower, step->lower + n_, lower);
+    std::copy(step->upper, step->upper + n_, upper);
+    std::fill(step->lower, step->lower + n_, -kInfinity);
+    std::fill(step->upper, step->upper + n_, kInfinity);
+    solved = LeastSquares(tasks, {}, center, false, step);
+    std::copy(lower, lower + n_, step->lower);
+    std::copy(upper, upper + n_, step->upper);
+    for (int i = 0; i < n_; ++i) step->v[i] = std::min(std::max(step->v[i], lower[i]), upper[i]);
+    step->violation = Violation(constraints, step->v, n_, &relative);
+  } else if (options_.formulation == IkFormulation::kDirection) {
     solved = Direction(tasks, constraints, center, step);
     step->violation = Violation(constraints, step->v, n_, &relative);
     solved = solved && relative <= kViolation;
@@ -198,10 +209,10 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
     IkTaskRows first = tasks;
     if (levels && tasks.level_sizes != nullptr) first.num = tasks.level_sizes[0];
     const double* const first_center = levels ? nullptr : center;
-    solved = LeastSquares(first, constraints, first_center, 0.0, step);
+    solved = LeastSquares(first, constraints, first_center, false, step);
     step->violation = Violation(constraints, step->v, n_, &relative);
     if (constraints.num > 0 && (!solved || relative > kViolation)) {
-      solved = LeastSquares(first, constraints, first_center, 1.0, step);
+      solved = LeastSquares(first, constraints, first_center, true, step);
       step->violation = Violation(constraints, step->v, n_, &relative);
       if (relative > kViolation) step->status = IkStatus::kRelaxed;
     }
@@ -222,8 +233,8 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
 // min ½ |W (J v − V)|² + ½ λ² |v|² + ½ ε |P (v − v_c)|², subject to the interval and constraints.
 // A relaxed one has one variable more, by which all constraints may be violated, at a high price.
 bool DifferentialIk::LeastSquares(const IkTaskRows& tasks, const LinearRows& constraints,
-                                  const double* v_c, double relaxed, IkStep* step) const {
-  const int n = n_, m = relaxed > 0.0 ? n + 1 : n;
+                                  const double* v_c, bool relaxed, IkStep* step) const {
+  const int n = n_, m = relaxed ? n + 1 : n;
   const double scale = Scale(tasks, n);
   const double regularization = kRegularization * scale;
   double d2 = regularization * regularization + options_.damping * options_.damping;

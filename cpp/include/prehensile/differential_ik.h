@@ -19,7 +19,7 @@ struct JointLimits {
   /// May be infinite.
   std::vector<double> position_lower;
   std::vector<double> position_upper;
-  /// Greatest speeds, > 0, may be infinite.
+  /// Greatest speeds, >= 0 (0 holds a joint where it is), may be infinite.
   std::vector<double> velocity;
   /// Greatest accelerations, > 0, may be infinite.
   std::vector<double> acceleration;
@@ -42,6 +42,9 @@ enum class IkFormulation {
   kDirection,
   /// Least squares, level by level, none of which disturbs those before it.
   kPriorities,
+  /// Least squares without limits, cut off joint by joint afterwards, as a robot's own controller
+  /// would: the (damped) pseudo-inverse. Constraints are not looked at.
+  kSaturated,
 };
 
 enum class IkCentering {
@@ -144,7 +147,7 @@ class DifferentialIk {
 
  private:
   bool LeastSquares(const IkTaskRows& tasks, const LinearRows& constraints, const double* v_c,
-                    double relaxed, IkStep* step) const;
+                    bool relaxed, IkStep* step) const;
   bool Direction(const IkTaskRows& tasks, const LinearRows& constraints, const double* v_c,
                  IkStep* step) const;
   void Priorities(const IkTaskRows& tasks, const LinearRows& constraints, const double* v_c,

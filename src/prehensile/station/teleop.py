@@ -2,7 +2,7 @@
 
 The station is driven through its command ports alone, so that a real one is driven the same way::
 
-    SliderSource ──pose──► DifferentialInverseKinematicsIntegrator ──► smoothing ──► iiwa.position
+    SliderSource ──pose──► DifferentialInverseKinematics ──► smoothing ──► iiwa.position
     SliderSource ──values (joints)───────────────────────────────────► smoothing ──► iiwa.position
     SliderSource ──values (width)──────────────────────────────────────────────────► wsg.position
 
@@ -17,17 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.multibody.inverse_kinematics import (
-    DifferentialInverseKinematicsIntegrator,
-    DifferentialInverseKinematicsParameters,
-)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import LinearSystem
 
 from prehensile.errors import Finding, InputError
-from prehensile.station.guard import COMMAND_PERIOD
+from prehensile.kinematics.differential_ik import DifferentialIkConfig, FrameTask, JointLimits
+from prehensile.kinematics.systems import DifferentialInverseKinematics
+from prehensile.kinematics.tree import tree_from_plant
+from prehensile.station.guard import COMMAND_PERIOD, GuardLimits
 from prehensile.station.robot_plant import add_part
 from prehensile.station.scenario import Scenario
 from prehensile.station.slider_source import Gamepad, Knob, SliderSource
@@ -41,6 +40,9 @@ _LINEAR_SPEED, _ANGULAR_SPEED = 0.3, 1.2
 _LINEAR_STEP, _ANGULAR_STEP = 0.005, 0.02
 # Share of a joint's speed limit that is used.
 _SPEED_SHARE = 0.6
+# Of the hand's way to the sliders: 1/s from distance to speed, and the damping that keeps an arm
+# stretched to its reach from trembling.
+_GAIN, _DAMPING = 20.0, 0.05
 # Time constant tau in s of the smoothing of joint commands.
 _SMOOTHING = 0.1
 _MAX_WIDTH, _WIDTH_STEP, _WIDTH_SPEED = 0.107, 0.002, 0.15
@@ -194,9 +196,9 @@ def pose_follower(arm: Arm, scenario: Scenario, planar: bool) -> System:
         FixedOffsetFrame("teleop", end.body_frame(), RigidTransform(R_EP), end.model_instance())
     )
     plant.Finalize()
-    n = plant.num_positions()
-    parameters = DifferentialInverseKinematicsParameters(n, plant.num_velocities())
-    speed = _SPEED_SHARE * _finite(plant.GetVelocityUpperLimits(), 1.0)
+    limits = GuardLimits.of_plant(plant, plant.GetModelInstanceByName(arm.name))
+    speed = _SPEED_SHARE * _finite(np.array(limits.velocity), 1.0)
+    weights = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
     if planar:
         turning = _joints_about_y(plant, arm.q0)
         if turning.sum() < 3:
@@ -207,16 +209,40 @@ def pose_follower(arm: Arm, scenario: Scenario, planar: bool) -> System:
                 )
             )
         speed = np.where(turning, speed, 0.0)
-        parameters.set_end_effector_velocity_flag(np.array([False, True, False, True, False, True]))
-    parameters.set_joint_velocity_limits((-speed, speed))
-    parameters.set_joint_position_limits(
-        (plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits())
+        weights = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
+    task = FrameTask(
+        weights=weights,
+        axes="frame",
+        gain=_GAIN,
+        max_angular=2 * _ANGULAR_SPEED,
+        max_linear=2 * _LINEAR_SPEED,
     )
-    parameters.set_nominal_joint_position(arm.q0)
-    parameters.set_joint_centering_gain(0.5 * np.eye(n))
-    return DifferentialInverseKinematicsIntegrator(
-        plant, frame, COMMAND_PERIOD, parameters, None, True
+    config = DifferentialIkConfig(
+        period=COMMAND_PERIOD,
+        damping=_DAMPING,
+        centering="nullspace",
+        centering_gain=0.5,
+        nominal_position=tuple(arm.q0),
     )
+    ik = DifferentialInverseKinematics(
+        tree_from_plant(plant, [frame]),
+        [task],
+        config,
+        limits=JointLimits(
+            lower=np.array(limits.position_lower),
+            upper=np.array(limits.position_upper),
+            velocity=speed,
+            acceleration=np.array(limits.acceleration),
+        ),
+        default_position=arm.q0,
+        names=["hand"],
+    )
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("differential_ik", ik)
+    builder.ExportInput(ik.GetInputPort("hand.pose"), "X_AE_desired")
+    builder.ExportInput(ik.GetInputPort("estimated_state"), "robot_state")
+    builder.ExportOutput(ik.GetOutputPort("position"), "joint_positions")
+    return builder.Build()
 
 
 def _joints_about_y(plant: MultibodyPlant, q: NDArray[np.float64]) -> NDArray[np.bool_]:
