@@ -14,10 +14,10 @@ class Page:
         self.meshes = {}
         self.real = Meshcat()
 
-    def Delete(self, path):  # noqa: N802
+    def Delete(self, path):
         self.meshes = {k: v for k, v in self.meshes.items() if not k.startswith(path)}
 
-    def SetObject(self, path, mesh, color):  # noqa: N802
+    def SetObject(self, path, mesh, color):
         self.real.SetObject(path, mesh, color)
         self.meshes[path] = mesh
 

@@ -22,7 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "view": ("view", "look at a model or a scenario, with joint sliders"),
     "teleop": ("teleop", "drive a station's arm and hand from the browser"),
     "models": ("models", "list the models, or show one"),
-    "reachability": ("reachability", "map what an arm reaches, and how freely"),
+    "reach": ("reachability", "map what an arm reaches, and how freely"),
     "diagram": ("diagram", "draw the system diagram of a station"),
     "bench": ("bench", "run the benchmarks beside their peers"),
     "doctor": ("doctor", "say what is missing on this machine, in words"),

@@ -1,4 +1,4 @@
-"""``prehensile reachability``: make, save and look at a map of what an arm reaches."""
+"""``prehensile reach``: make, save and look at a map of what an arm reaches."""
 
 import argparse
 import math
@@ -24,7 +24,7 @@ _VALUES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the arguments of ``prehensile reachability``."""
+    """Declares the arguments of ``prehensile reach``."""
     from prehensile.cli.run import add_page_arguments
 
     parser.description = (
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs ``prehensile reachability``."""
+    """Runs ``prehensile reach``."""
     from prehensile.errors import Finding, InputError
     from prehensile.kinematics.reachability import load_map, save_map
 

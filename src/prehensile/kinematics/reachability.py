@@ -256,7 +256,7 @@ def load_map(path: Path) -> ReachabilityMap:
     """
 
     def bad(message: str) -> InputError:
-        mend = "make it with 'prehensile reachability'"
+        mend = "make it with 'prehensile reach'"
         return InputError(Finding(message, mend, file=str(path)))
 
     try:
