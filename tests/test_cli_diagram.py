@@ -35,12 +35,23 @@ def test_page_by_default_in_the_working_directory(
     assert "inverse_dynamics_controller" in page
 
 
+def test_draws_the_tree_of_a_scenario_and_of_a_model(tmp_path: Path) -> None:
+    scenario, model = tmp_path / "scenario.svg", tmp_path / "model.png"
+    assert main(["diagram", "pick_brick", "--tree", "-o", str(scenario)]) == 0
+    texts = {e.text for e in ElementTree.parse(scenario).iter("{http://www.w3.org/2000/svg}text")}
+    assert {"world", "iiwa_link_7", "iiwa_joint_7", "foam_brick"} <= texts
+    assert main(["diagram", "wsg50", "--tree", "-o", str(model)]) == 0
+    assert Image.open(model).height > 200
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["two_bins", "-o", "x.dot"], "no picture is written as '.dot'"),
         (["two_bins", "--depth", "0"], "a depth of 0"),
         (["no_such_place"], "no_such_place"),
+        (["no_such_place", "--tree"], "no_such_place"),
+        (["iiwa7", "--tree", "-o", "x.html"], "no kinematic tree is written as '.html'"),
     ],
 )
 def test_clear_errors(
