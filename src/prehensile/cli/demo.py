@@ -39,6 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_models(hands)
     _add_common(hands)
     hands.set_defaults(start=_hands)
+    bimanual = demos.add_parser("bimanual", help="two arms lift a box between their hands")
+    _add_common(bimanual)
+    bimanual.set_defaults(start=_bimanual)
+    iiwa_allegro = demos.add_parser(
+        "iiwa-allegro", help="an arm with a hand of four fingers, which closes and opens"
+    )
+    _add_common(iiwa_allegro)
+    iiwa_allegro.set_defaults(start=_iiwa_allegro)
 
 
 # As in prehensile.control.joint_controller, which would import Drake.
@@ -113,6 +121,18 @@ def _hands(args: argparse.Namespace) -> int:
     from prehensile.tasks.gallery import hands
 
     return _gallery(args, hands(args.models))
+
+
+def _bimanual(args: argparse.Namespace) -> int:
+    from prehensile.tasks.gallery_pairs import bimanual
+
+    return _gallery(args, bimanual())
+
+
+def _iiwa_allegro(args: argparse.Namespace) -> int:
+    from prehensile.tasks.gallery_pairs import iiwa_allegro
+
+    return _gallery(args, iiwa_allegro())
 
 
 def _gallery(args: argparse.Namespace, show: "Show") -> int:

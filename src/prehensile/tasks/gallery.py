@@ -352,11 +352,12 @@ def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryRepor
     recorder.save(out / "replay.html")
     write_json(out / "report.json", report.to_json())
 
-    table = Table(title=f"{demo}, {report.controller}".strip(", "), title_justify="left")
+    title = f"{demo}, {report.controller}; errors in mrad, or mm where joints slide"
+    table = Table(title=title, title_justify="left")
     for column in ("robot", "joints", "holds", "follows", "ends", "speed", "effort", "limits"):
         table.add_column(column, justify="left" if column in ("robot", "limits") else "right")
     for r in report.robots:
-        errors = (f"{1e3 * e:.2f} mrad" for e in (r.hold_error, r.follow_error, r.end_error))
+        errors = (f"{1e3 * e:.2f}" for e in (r.hold_error, r.follow_error, r.end_error))
         parts = (f"{100 * part:.0f} %" for part in (r.speed, r.effort))
         kept = "kept" if r.limits_kept else "broken"
         table.add_row(r.model, str(r.joints), *errors, *parts, kept)

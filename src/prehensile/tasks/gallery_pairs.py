@@ -142,7 +142,7 @@ def iiwa_allegro() -> Show:
 OPEN = np.zeros(16) + 0.3 * (np.arange(16) == 12)
 """Joint angles of the Allegro hand with straight fingers, in rad."""
 
-CLOSED = np.array([0.0, 1.2, 1.0, 0.8] * 3 + [1.2, 0.3, 0.6, 0.8])
+CLOSED = np.array([0.0, 1.2, 1.0, 0.8] * 3 + [1.0, 0.3, 0.3, 0.5])
 """Joint angles of the Allegro hand with bent fingers and the thumb across, in rad."""
 
 
@@ -205,7 +205,7 @@ def _lifted(plant: MultibodyPlant, context: Context) -> Mapping[str, float]:
     ]
     left, right = (X_WG.translation() for X_WG in hands)
     return {
-        "height of the box's middle [m]": float(X_WBox.translation()[2]),
-        "tip of the box [rad]": float(np.arccos(np.clip(X_WBox.rotation().matrix()[2, 2], -1, 1))),
-        "asymmetry of the hands [m]": float(np.linalg.norm(left - right * [1.0, -1.0, 1.0])),
+        "height of the box's middle, m": float(X_WBox.translation()[2]),
+        "tip of the box, rad": float(np.arccos(np.clip(X_WBox.rotation().matrix()[2, 2], -1, 1))),
+        "asymmetry of the hands, m": float(np.linalg.norm(left - right * [1.0, -1.0, 1.0])),
     }
