@@ -100,18 +100,18 @@ class Constraints {
       if (!*side) continue;
       batch ? (*side)->RequireShape({count, m}) : (*side)->RequireShape({m});
     }
-    if (lower_ && upper_) {
-      for (std::size_t i = 0; i < lower_->size(); ++i) {
-        if (!(lower_.data()[i] <= upper_.data()[i])) {
-          throw std::invalid_argument("lower: above upper, or NaN");
-        }
-      }
-    }
     const std::size_t size = N * static_cast<std::size_t>(m);
     rows.num = static_cast<int>(m);
     rows.C = A_.data();
     rows.lower = Side(lower_, "lower", size, -kInfinity);
     rows.upper = Side(upper_, "upper", size, kInfinity);
+    if (lower_ && upper_) {
+      for (std::size_t i = 0; i < lower_->size(); ++i) {
+        if (lower_.data()[i] > upper_.data()[i]) {
+          throw std::invalid_argument("lower: above upper");
+        }
+      }
+    }
   }
 
   LinearRows rows;
