@@ -1,6 +1,6 @@
 """Panda, UR5e, UR10e, Gen3, xArm 7: against the makers' kinematics and what a body can be."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +10,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
+from prehensile.models.generate.robots import _arm, _ur, ur5e, ur10e
+from prehensile.models.generate.sdf_model import sdf_text
 from prehensile.models.registry import load_spheres
 
 DRAKE_MODELS = Path(__file__).parents[1].parent / "shared" / "drake_models"
@@ -47,7 +50,7 @@ class Facts:
     free: float
     craig: bool = False
     tolerance: float = 1e-9
-    start: RigidTransform = RigidTransform()
+    start: RigidTransform = field(default_factory=RigidTransform)
 
 
 PI, Q = np.pi, 0.5 * np.pi
@@ -279,6 +282,21 @@ def test_arm_is_clear_of_itself_where_it_should_be(arm: tuple[str, Facts, Scene]
     # No pair is in touch at large: that would be a fault of its shapes.
     for pair in set().union(*met):
         assert sum(pair in pairs for pairs in met) < 0.12 * len(met)
+
+
+@pytest.mark.parametrize("member", [ur5e.UR5E, ur10e.UR10E], ids=["ur5e", "ur10e"])
+def test_links_that_are_kept_apart_cannot_meet(member: _ur.Member) -> None:
+    made = _arm.model(_ur.arm(member), _ur.collisions(member.build))
+    unseen = tuple(replace(link, visuals=()) for link in made.links)
+    builder = RobotDiagramBuilder(0.0)
+    plant = builder.plant()
+    builder.parser().AddModelsFromString(sdf_text(replace(made, links=unseen, apart=())), "sdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link"))
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    free = Scene(diagram, plant, root, plant.GetMyMutableContextFromRoot(root))
+    for q in configurations(plant, 300):
+        assert not set(made.apart) & contacts(free, q)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from prehensile.files import write_atomic
@@ -95,13 +96,13 @@ class Arm:
     apart: tuple[tuple[str, str], ...] = ()
 
 
-def capsule(name: str, radius: float, start: Sequence[float], end: Sequence[float]) -> Collision:
+def capsule(name: str, radius: float, start: ArrayLike, end: ArrayLike) -> Collision:
     """A capsule about the line between two points of a link, m."""
     pose, length = _along(start, end)
     return Collision(name, Shape("capsule", (radius, length)), pose, METAL)
 
 
-def cylinder(name: str, radius: float, start: Sequence[float], end: Sequence[float]) -> Collision:
+def cylinder(name: str, radius: float, start: ArrayLike, end: ArrayLike) -> Collision:
     """A cylinder about the line between two points of a link, m."""
     pose, length = _along(start, end)
     return Collision(name, Shape("cylinder", (radius, length)), pose, METAL)
@@ -191,7 +192,7 @@ def _pose(X: RigidTransform) -> Pose:
     return (*X.translation(), *angles)
 
 
-def _along(start: Sequence[float], end: Sequence[float]) -> tuple[Pose, float]:
+def _along(start: ArrayLike, end: ArrayLike) -> tuple[Pose, float]:
     """The pose whose z axis leads from one point to the other from midway, and the distance."""
     a, b = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(b - a))

@@ -122,35 +122,56 @@ def arm(member: Member) -> Arm:
             Frame("flange", "wrist_3_link", (0.0, 0.0, 0.0, 0.0, -QUARTER, -QUARTER)),
             Frame("tool0", "wrist_3_link"),
         ),
+        # The upper arm passes beside the base; spheres about the two would touch.
+        apart=(("base_link", "upper_arm_link"),),
     )
+
+
+def _drum(
+    name: str, radius: float, face: tuple[float, float, float], lid: tuple[float, float, float]
+) -> Collision:
+    """A capsule for a drum between its joint and its lid.
+
+    One end runs on into the next link, which it never meets, by half its radius; the other stands
+    out of the lid a little, for the rim of the lid is round as well.
+    """
+    a, b = np.asarray(face, float), np.asarray(lid, float)
+    along = (b - a) / np.linalg.norm(b - a)
+    return capsule(name, radius, a + 0.5 * radius * along, b - (radius - 0.006) * along)
 
 
 def collisions(b: Build) -> list[tuple[Collision, ...]]:
     """The collision shapes of base and links."""
     upper, forearm, end = 0.5 * sum(b.upper_tube), 0.5 * sum(b.forearm_tube), 0.03 - b.a3
+    into = 0.5 * b.wrist
+    # A ball on the floor that reaches into the shoulder like a drum.
+    neck = min(b.shoulder, 2.0 / 3.0 * b.top)
     return [
-        (cylinder("foot", b.foot - 0.004, (0, 0, 0), (0, 0, b.top)),),
         (
-            cylinder("barrel", b.shoulder, (0, 0, b.top - b.d1), (0, 0, b.shoulder_lid)),
-            cylinder("side", b.shoulder, (0, 0, 0), (0, -b.shoulder_face, 0)),
+            cylinder("foot", b.foot - 0.002, (0, 0, 0), (0, 0, 0.05)),
+            capsule("neck", neck, (0, 0, neck), (0, 0, max(b.top - 0.5 * neck, neck + 0.002))),
         ),
         (
-            cylinder("shoulder", b.shoulder, (0, 0, b.shoulder_face), (0, 0, b.upper_lids[0])),
+            _drum("barrel", b.shoulder, (0, 0, b.top - b.d1), (0, 0, b.shoulder_lid)),
+            capsule("side", b.shoulder, (0, 0, 0), (0, 0.5 * b.shoulder - b.shoulder_face, 0)),
+        ),
+        (
+            _drum("shoulder", b.shoulder, (0, 0, b.shoulder_face), (0, 0, b.upper_lids[0])),
             capsule("tube", upper, (0, 0, b.upper_axis), (-b.a2, 0, b.upper_axis)),
-            cylinder("elbow", b.elbow, (-b.a2, 0, b.elbow_face), (-b.a2, 0, b.upper_lids[1])),
+            _drum("elbow", b.elbow, (-b.a2, 0, b.elbow_face), (-b.a2, 0, b.upper_lids[1])),
         ),
         (
-            cylinder("elbow", b.elbow, (0, 0, b.elbow_lid), (0, 0, b.elbow_face)),
+            _drum("elbow", b.elbow, (0, 0, b.elbow_face), (0, 0, b.elbow_lid)),
             capsule("tube", forearm, (0, 0, b.forearm_axis), (end, 0, b.forearm_axis)),
-            cylinder("wrist", b.wrist, (-b.a3, 0, b.forearm_end), (-b.a3, 0, b.wrist_1_face)),
+            _drum("wrist", b.wrist, (-b.a3, 0, b.wrist_1_face), (-b.a3, 0, b.forearm_end)),
         ),
         (
-            cylinder("neck", b.wrist, (0, 0, b.wrist_1_face - b.d4), (0, 0, 0)),
-            cylinder("barrel", b.wrist, (0, -b.wrist_2_face, 0), (0, b.wrist_lid, 0)),
+            capsule("neck", b.wrist, (0, 0, b.wrist_1_face - b.d4 + into), (0, 0, 0)),
+            _drum("barrel", b.wrist, (0, -b.wrist_2_face, 0), (0, b.wrist_lid, 0)),
         ),
         (
-            cylinder("neck", b.wrist, (0, 0, b.wrist_2_face - b.d5), (0, 0, 0)),
-            cylinder("barrel", b.wrist, (0, b.wrist_3_face, 0), (0, -b.wrist_lid, 0)),
+            capsule("neck", b.wrist, (0, 0, b.wrist_2_face - b.d5 + into), (0, 0, 0)),
+            _drum("barrel", b.wrist, (0, b.wrist_3_face, 0), (0, -b.wrist_lid, 0)),
         ),
         (cylinder("flange", b.flange, (0, 0, b.wrist_3_face - b.d6), (0, 0, 0)),),
     ]
