@@ -281,7 +281,12 @@ class _Adder:
         desired = self.before(
             controller.get_input_port_desired_state(), np.kron(np.eye(2), order), "desired_order"
         )
-        return desired, self.through(controller.get_output_port_control(), order.T, "effort_order")
+        # Its output is in the order of the model's actuators.
+        driven = [
+            model.get_joint_actuator(index).joint() for index in model.GetJointActuatorIndices()
+        ]
+        effort = controller.get_output_port_control()
+        return desired, self.through(effort, _selection(self.joints, driven), "effort_order")
 
     def actuation(self, instances: Sequence[ModelInstanceIndex], effort: OutputPort) -> None:
         """Gives each model its part of the efforts."""
