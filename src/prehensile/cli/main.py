@@ -21,7 +21,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("run", "simulate a scenario and watch it in the browser"),
     "view": ("view", "look at a model or a scenario, with joint sliders"),
     "teleop": ("teleop", "drive a station's arm and hand from the browser"),
-    "models": ("models", "list the models, or show one"),
+    "models": ("models", "list the models, show one, or convert yours"),
     "reach": ("reachability", "map what an arm reaches, and how freely"),
     "diagram": ("diagram", "draw the system diagram of a station"),
     "bench": ("bench", "run the benchmarks beside their peers"),

@@ -1,10 +1,11 @@
-"""``prehensile models``: list the models, or show one."""
+"""``prehensile models``: list the models, show one, or convert somebody else's."""
 
 import argparse
 import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from prehensile.cli import models_convert
 from prehensile.models.registry import CATEGORIES, ModelInfo, find_model, list_models
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the subcommands ``list`` and ``show``."""
+    """Adds the subcommands ``list``, ``show`` and ``convert``."""
     parser.description = (
         "The models that come with prehensile, and those in the folders that the environment "
         "variable PREHENSILE_MODEL_PATH lists."
@@ -24,14 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show = commands.add_parser("show", help="show what a model consists of")
     show.add_argument("name", metavar="NAME", help="a model's name, or package://PACKAGE/PATH")
     show.set_defaults(start=_show)
-    for command in (listing, show):
+    convert = commands.add_parser("convert", help="make a model that Drake loads out of a file")
+    models_convert.add_arguments(convert)
+    convert.set_defaults(start=models_convert.run)
+    for command in (listing, show, convert):
         command.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
         )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs ``list`` or ``show``."""
+    """Runs the subcommand."""
     return args.start(args)
 
 

@@ -1,11 +1,12 @@
-"""The converted model as Drake sees it: it loads, and rests without its own parts in one another."""
+"""The converted model as Drake sees it: it loads, and its parts rest apart from one another."""
 
+import logging
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
 
 from prehensile.errors import Finding, InputError
 from prehensile.models.model_file import ModelFileReader
@@ -24,11 +25,30 @@ class Loaded:
         summary: numbers of links, joints, actuators, constraints; mass in kg.
         overlaps: pairs of links (scoped names) whose shapes are in one another at rest.
         off_zero: joints whose limits exclude zero, where Drake puts them by default.
+        warnings: what Drake said while loading.
     """
 
     summary: Mapping[str, Any]
     overlaps: list[tuple[str, str]]
     off_zero: list[str]
+    warnings: list[str]
+
+
+class _Listener(logging.Handler):
+    """Collects what Drake logs while it loads a file."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(logging.WARNING)
+        self._path = path
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(self.plain(record.getMessage()))
+
+    def plain(self, text: str) -> str:
+        """Without the folder, which is gone when somebody reads it, and on one line."""
+        text = " ".join(text.split()).replace(f"{self._path.parent}/", "")
+        return re.sub(r"^(warning|error): ", "", text)[:500]
 
 
 def load(path: Path) -> Loaded:
@@ -52,6 +72,10 @@ def load(path: Path) -> Loaded:
         raise InputError(*(Finding(f.message, f.mend, key="converted model") for f in findings))
     builder = RobotDiagramBuilder(time_step=0.002)
     plant: Any = builder.plant()
+    said = _Listener(path)
+    logger = logging.getLogger("drake")
+    logger.addHandler(said)
+    logger.propagate, propagate = False, logger.propagate
     try:
         (instance,) = Parser(plant).AddModels(path)[:1]
         plant.Finalize()
@@ -62,8 +86,11 @@ def load(path: Path) -> Loaded:
         mass = plant.CalcTotalMass(plant_context)
         overlaps = _overlaps(plant, diagram, context)
     except (Exception, SystemExit) as error:  # a failed DRAKE_DEMAND is a SystemExit
-        said = " ".join(str(error).split()).replace(f"{path.parent}/", "")
-        raise InputError(Finding(f"Drake refuses the converted model: {said}")) from None
+        message = f"Drake refuses the converted model: {said.plain(str(error))}"
+        raise InputError(Finding(message)) from None
+    finally:
+        logger.removeHandler(said)
+        logger.propagate = propagate
     joints = [plant.get_joint(i) for i in plant.GetJointIndices()]
     moving = [j for j in joints if j.num_velocities() and "floating" not in j.type_name()]
     free = any("floating" in j.type_name() for j in joints)
@@ -76,7 +103,7 @@ def load(path: Path) -> Loaded:
         "mass": f"{mass:.4g} kg",
         "base": "free (weld it where you use it)" if free else "fixed to the world",
     }
-    return Loaded(summary, overlaps, off_zero)
+    return Loaded(summary, overlaps, off_zero, said.texts)
 
 
 def _rest(plant: "MultibodyPlant", context: Any) -> list[str]:
@@ -109,5 +136,3 @@ def _overlaps(plant: "MultibodyPlant", diagram: Any, context: Any) -> list[tuple
         if hit.depth > _OVERLAP
     }
     return sorted((a, b) for a, b in pairs if a != b)
-
-

@@ -1,10 +1,10 @@
 """Reading numbers, poses and shapes from elements of any of the three formats, with findings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from prehensile.errors import Finding, InputError
@@ -47,7 +47,7 @@ class Source:
             raise InputError(*dict.fromkeys(self.findings))
 
     def floats(
-        self, element: Element, text: str | None, count: int, default: Sequence[float], key: str
+        self, element: Element, text: str | None, count: int, default: ArrayLike, key: str
     ) -> np.ndarray:
         """Reads finite numbers; a fault and the default if they are none or too few or many."""
         if text is None or not text.strip():
@@ -128,26 +128,22 @@ def transform(p: np.ndarray, R: Rotation) -> np.ndarray:
 
 def pose_element(X: np.ndarray, urdf: bool) -> Element:
     """``<origin>`` of URDF or ``<pose>`` of SDF of a (4, 4) pose."""
-    R = Rotation.from_matrix(X[:3, :3])
+    rpy = _rpy(X[:3, :3])
     if urdf:
-        return make("origin", xyz=numbers(X[:3, 3]), rpy=numbers(_rpy(X[:3, :3])))
-    if np.allclose(X[:3, :3], np.eye(3), atol=0):
-        return make("pose", numbers([*X[:3, 3], 0, 0, 0]))
-    text = numbers([*X[:3, 3], *R.as_quat()])
-    return make("pose", text, rotation_format="quat_xyzw")
+        return make("origin", xyz=numbers(X[:3, 3]), rpy=numbers(rpy))
+    return make("pose", numbers([*X[:3, 3], *rpy]))
 
 
 def _rpy(R: np.ndarray) -> np.ndarray:
-    """Roll, pitch, yaw; yaw 0 at the gimbal lock, where SciPy would warn."""
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[2, 1], R[2, 2]))
-    if np.hypot(R[2, 1], R[2, 2]) < 1e-9:
+    """Roll, pitch, yaw; yaw 0 at the gimbal lock, where SciPy would warn (exact to 1e-7)."""
+    cosine = np.hypot(R[2, 1], R[2, 2])
+    pitch = np.arctan2(-R[2, 0], cosine)
+    if cosine < 1e-7:
         return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
     return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
 
 
-def inertial_element(
-    mass: float, X_LI: np.ndarray, inertia: np.ndarray, urdf: bool
-) -> Element:
+def inertial_element(mass: float, X_LI: np.ndarray, inertia: np.ndarray, urdf: bool) -> Element:
     """``<inertial>``: mass, pose of the inertial frame in the link, (3, 3) inertia in it."""
     moments = dict(
         zip(

@@ -74,8 +74,8 @@ class InertiaMender:
             return 0.0
         said = value(inertial.child("mass"), "value") or value(inertial, "mass") or ""
         mass, moments = _number(said), inertial.child("inertia")
-        I = [_number(value(moments, key) or "0") for key in _MOMENTS]
-        if not (math.isfinite(mass) and mass >= 0 and all(map(math.isfinite, I))):
+        given = [_number(value(moments, key) or "0") for key in _MOMENTS]
+        if not (math.isfinite(mass) and mass >= 0 and all(map(math.isfinite, given))):
             wrong = f"mass '{said}'" if not mass >= 0 or math.isinf(mass) else "its inertia"
             text = f"{wrong} is no number a body can have: taken as if there were none"
             self._report.add("inertia", f"link {name}", text, inertial.line)
@@ -85,12 +85,12 @@ class InertiaMender:
             link.children.remove(inertial)
             if not self._urdf:
                 link.children.insert(0, new)
-            if any(I):
+            if any(given):
                 text = "an inertia without mass: taken out"
                 self._report.add("inertia", f"link {name}", text, inertial.line)
             return 0.0
         inertia = np.zeros((3, 3))
-        inertia[np.triu_indices(3)] = I
+        inertia[np.triu_indices(3)] = given
         inertia = inertia + np.triu(inertia, 1).T
         X_LI = self._source.pose(inertial)
         if not inertia.any():
@@ -113,7 +113,7 @@ class InertiaMender:
                 f"that one can, {_three(b)}"
             )
             self._report.add("inertia", f"link {name}", text, inertial.line)
-        if possible is not inertia or not np.array_equal(inertia[np.triu_indices(3)], I):
+        if possible is not inertia or not np.array_equal(inertia[np.triu_indices(3)], given):
             set_child(link, inertial_element(mass, X_LI, possible, self._urdf))
         return mass
 
@@ -128,7 +128,7 @@ class InertiaMender:
     def _needing_mass(self, masses: dict[str, float]) -> list[str]:
         """Links to be given mass, so that no joint moves nothing and no free base is nothing."""
         group = self._tree.rigid_groups()
-        total = {k: 0.0 for k in group.values()}
+        total = dict.fromkeys(group.values(), 0.0)
         for name, mass in masses.items():
             total[group[name]] += mass
         outboard: dict[int, list[int]] = {k: [] for k in total}
@@ -158,9 +158,7 @@ class InertiaMender:
         properties = combined([(s, self._density) for s in solids or [_TOKEN]])
         X_LI = np.eye(4)
         X_LI[:3, 3] = properties.p_BoBcm_B
-        set_child(
-            link, inertial_element(properties.mass, X_LI, properties.I_BBcm_B, self._urdf)
-        )
+        set_child(link, inertial_element(properties.mass, X_LI, properties.I_BBcm_B, self._urdf))
         what = "its shapes" if solids else "no shape either: a ball of 2 cm"
         text = f"{why}: {properties.mass:.3g} kg, {what} of {self._density:g} kg/m³"
         self._report.add("inertia", f"link {name}", text, link.line)

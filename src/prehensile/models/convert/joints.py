@@ -22,6 +22,7 @@ class JointMender:
         source: findings go there.
         report: what was done is noted here.
         urdf: whether it is URDF, else SDF.
+        drive_all: whether every joint that can be is to be driven.
     """
 
     model: Element
@@ -29,15 +30,18 @@ class JointMender:
     source: Source
     report: Report
     urdf: bool
+    drive_all: bool
 
     def mend(self) -> None:
         """Mends limits, axes and couplings, then gives actuators where nobody did."""
         for joint in self.tree.joints:
             self._check_axis(joint)
+            self._drop_friction(joint)
             for limit in self._limits(joint):
                 self._mend_limits(joint, limit)
             if not self.urdf:
                 self._mend_mimic(joint)
+                self._actuate_sdf(joint)
         if self.urdf:
             self._actuate_urdf()
 
@@ -73,6 +77,7 @@ class JointMender:
         return [limit for axis in axes for limit in axis.all("limit")]
 
     def _check_axis(self, joint: JointRef) -> None:
+        self.source.pose(joint.element)
         axis = joint.element.child("axis")
         if joint.kind not in _AXIS or axis is None:
             return
@@ -118,6 +123,14 @@ class JointMender:
         for key in keys:
             limit.attributes.pop(key, None)
 
+    def _drop_friction(self, joint: JointRef) -> None:
+        for element in joint.element.walk():
+            if element.tag == "dynamics" and value(element, "friction") is not None:
+                if value(element, "friction") not in ("0", "0.0"):
+                    text = "dry friction, which Drake's joints do not have"
+                    self.report.add("dropped", f"joint {joint.name}", text, element.line)
+                self._drop(element, "friction")
+
     def _mend_mimic(self, joint: JointRef) -> None:
         """SDF 1.11's own ``<mimic>``, which Drake does not read, becomes Drake's."""
         axis = joint.element.child("axis")
@@ -142,6 +155,18 @@ class JointMender:
             )
         )
         self.report.add("joint", joint.name, f"follows {leader}: as drake:mimic", mimic.line)
+
+    def _actuate_sdf(self, joint: JointRef) -> None:
+        """In SDF a joint is driven unless its effort limit is zero."""
+        follows = joint.element.child("drake:mimic") is not None
+        for limit in self._limits(joint):
+            if joint.single and value(limit, "effort") in ("0", "0.0") and not follows:
+                if self.drive_all:
+                    self._drop(limit, "effort")
+                    text = "zero effort, which is no drive: driven without a limit, as asked for"
+                else:
+                    text = "zero effort: not driven (--actuators all drives it)"
+                self.report.add("actuator", f"joint {joint.name}", text, limit.line)
 
     def _actuate_urdf(self) -> None:
         """Transmissions that Drake understands, and for every joint that has a drive.
@@ -175,8 +200,14 @@ class JointMender:
             if wanted:
                 text = f"no transmissions: {len(wanted)} joints that move were given one"
                 self.report.add("actuator", "joints", text)
-            for name in sorted(set(single) - set(wanted)):
-                self.report.add("actuator", f"joint {name}", "zero effort: not driven")
+        undriven = [name for name in single if name not in wanted]
+        if undriven and self.drive_all:
+            wanted |= {name: name for name in undriven}
+            text = f"{', '.join(undriven)}: driven too, as asked for"
+            self.report.add("actuator", "joints", text)
+        elif undriven:
+            text = f"{', '.join(undriven)}: not driven (--actuators all drives them)"
+            self.report.add("actuator", "joints", text)
         remove(self.model, "transmission")
         for name, actuator in wanted.items():
             joint = single.get(name)
@@ -196,9 +227,7 @@ class JointMender:
                 self.report.add("actuator", f"joint {name}", text, joint.element.line)
             drive = make("actuator", name=actuator)
             if name in kept:
-                drive.children = [
-                    c for c in kept[name].children if c.tag.startswith("drake:")
-                ]
+                drive.children = [c for c in kept[name].children if c.tag.startswith("drake:")]
             self.model.children.append(
                 make(
                     "transmission",

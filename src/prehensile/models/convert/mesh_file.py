@@ -192,7 +192,8 @@ def _look(visual: Any, suffix: str) -> tuple[np.ndarray | None, Material | None]
         return np.asarray(uvs, float), Material(color=(1.0, 1.0, 1.0, 1.0), texture=png.getvalue())
     color = np.asarray(material.main_color) / 255.0
     if suffix in (".gltf", ".glb"):
-        return None, Material(color=tuple(float(c) for c in color))
+        r, g, b, alpha = (float(c) for c in color)
+        return None, Material(color=(r, g, b, alpha))
     return None, Material(color=linear(color))
 
 

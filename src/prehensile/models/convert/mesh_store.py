@@ -258,5 +258,3 @@ def _hull(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, ::-1]
     return points, faces
-
-

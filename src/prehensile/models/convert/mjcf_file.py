@@ -15,7 +15,8 @@ from prehensile.models.xml_lines import Element, read_xml
 
 _MAX_INCLUDES = 200
 DRIVES = (
-    "general motor position velocity intvelocity damper cylinder muscle adhesion dcmotor".split()
+    *("general", "motor", "position", "velocity", "intvelocity"),
+    *("damper", "cylinder", "muscle", "adhesion", "dcmotor"),
 )
 
 
@@ -173,7 +174,9 @@ class MjcfFile:
             except (QhullError, ValueError):
                 self.source.fault(element, "the points are in a plane", "", "vertex")
                 return None
-            return MeshAsset(meshes.add_points(element.name or "points", points, faces), scale, X_GM)
+            return MeshAsset(
+                meshes.add_points(element.name or "points", points, faces), scale, X_GM
+            )
         file = given.get("file", "")
         if not file:
             self.source.fault(element, "<mesh> names no file", "name the mesh file", "file")
@@ -181,6 +184,9 @@ class MjcfFile:
         try:
             return MeshAsset(str(self._file(file)), scale, X_GM)
         except InputError as error:
+            if "there is no file" in str(error):
+                # Said, or left out, where a geom uses it.
+                return MeshAsset(file, scale, X_GM)
             for finding in error.findings:
                 self.source.fault(element, finding.message, finding.mend, f"mesh {file}")
             return None
@@ -247,7 +253,9 @@ class MjcfFile:
             groups = given.get("inertiagrouprange")
             low, high = self.source.floats(element, groups, 2, compiler.groups, "inertiagrouprange")
             if given.get("coordinate") == "global":
-                self.source.fault(element, "global coordinates, which MuJoCo gave up", "", "coordinate")
+                self.source.fault(
+                    element, "global coordinates, which MuJoCo gave up", "", "coordinate"
+                )
             compiler = replace(
                 compiler,
                 radians=given.get("angle", "radian" if compiler.radians else "degree") == "radian",

@@ -23,14 +23,25 @@ class Geoms:
     """What the geoms of one body come to.
 
     Attributes:
-        elements: ``<visual>`` and ``<collision>``.
+        visuals: ``<visual>`` of what does not touch.
+        touching: ``<visual>`` of what touches too.
+        collisions: ``<collision>``.
         solids: of each geom that has mass, in the body's frame, with its density.
         bits: (contype, conaffinity) of what touches.
+        weigh: whether the body's inertia is to be that of its geoms.
     """
 
-    elements: list[Element] = field(default_factory=list)
+    visuals: list[Element] = field(default_factory=list)
+    touching: list[Element] = field(default_factory=list)
+    collisions: list[Element] = field(default_factory=list)
     solids: list[tuple[Solid, float]] = field(default_factory=list)
     bits: set[tuple[int, int]] = field(default_factory=set)
+    weigh: bool = False
+
+    @property
+    def elements(self) -> list[Element]:
+        """All; what touches is seen only where nothing is there just to be seen."""
+        return [*(self.visuals or self.touching), *self.collisions]
 
 
 @dataclass(frozen=True)
@@ -68,7 +79,7 @@ class GeomReader:
             text = f"a {kind} to be fitted to a mesh: the mesh itself"
             self.report.add("mesh", label, text, geom.line)
         if "mesh" in given:
-            shape = self._mesh(geom, given)
+            shape = self._mesh(geom, given, geoms.weigh)
         elif kind in _SIZES:
             shape = self._primitive(geom, given, kind)
         else:
@@ -83,16 +94,15 @@ class GeomReader:
         def integer(key: str, default: int) -> int:
             return int(self.file.source.floats(geom, given.get(key), 1, (default,), key)[0])
 
-        name = geom.name or f"geom_{len(geoms.elements)}"
+        name = geom.name or f"geom_{len(geoms.visuals) + len(geoms.collisions)}"
         name = name.replace("::", "_")
         pose = pose_element(X_BG, urdf=False)
         bits = (integer("contype", 1), integer("conaffinity", 1))
         rgba = self._rgba(geom, given)
         if integer("group", 0) < _SHOWN and rgba[3] > 0:
             material = make("material", make("diffuse", numbers(rgba)))
-            geoms.elements.append(
-                make("visual", pose, make("geometry", geometry), material, name=name)
-            )
+            seen = make("visual", pose, make("geometry", geometry), material, name=name)
+            (geoms.touching if any(bits) else geoms.visuals).append(seen)
         if any(bits):
             geoms.bits.add(bits)
             friction = given.get("friction", "1").split()[0]
@@ -104,7 +114,7 @@ class GeomReader:
                 make("drake:mu_static", mu),
                 make("drake:mu_dynamic", mu),
             )
-            geoms.elements.append(
+            geoms.collisions.append(
                 make("collision", pose, make("geometry", geometry), contact, name=name)
             )
 
@@ -115,7 +125,7 @@ class GeomReader:
         return np.clip(self.file.source.floats(geom, text, 4, (0.5, 0.5, 0.5, 1), "rgba"), 0, 1)
 
     def _mesh(
-        self, geom: Element, given: dict[str, str]
+        self, geom: Element, given: dict[str, str], weigh: bool
     ) -> tuple[np.ndarray, Element, Solid | None] | None:
         asset = self.assets.get(given["mesh"])
         if asset is None:
@@ -128,11 +138,11 @@ class GeomReader:
             return None
         geometry = make("mesh", make("uri", asset.uri), make("scale", numbers(asset.scale)))
         solid = None
-        if self._counts(given):
+        if weigh and self._counts(given):
             try:
                 solid = self.meshes.solid(asset.uri, asset.scale)
             except InputError as error:
-                if "flat" not in str(error):
+                if "flat" not in str(error) and "there is no file" not in str(error):
                     for finding in error.findings:
                         self.file.source.fault(geom, finding.message, finding.mend, "mesh")
                     return None
@@ -172,9 +182,7 @@ class GeomReader:
         else:
             sizes[1] *= 2
             tag = "capsule" if kind == "capsule" else "cylinder"
-            geometry = make(
-                tag, make("radius", number(sizes[0])), make("length", number(sizes[1]))
-            )
+            geometry = make(tag, make("radius", number(sizes[0])), make("length", number(sizes[1])))
         return X, geometry, primitive(kind, sizes)
 
     def _counts(self, given: dict[str, str]) -> bool:
@@ -193,7 +201,7 @@ class GeomReader:
         X_BG: np.ndarray,
         geoms: Geoms,
     ) -> None:
-        if solid is None or not self._counts(given):
+        if solid is None or not geoms.weigh or not self._counts(given):
             return
         read = self.file.source.floats
         if "mass" in given:

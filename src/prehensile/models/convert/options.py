@@ -8,14 +8,14 @@ from pathlib import Path
 from prehensile.errors import Finding, InputError
 
 COLLISIONS = ("hull", "decompose", "box", "keep")
-"""What becomes of a collision mesh: its convex hull, several convex pieces, its least box, itself."""
+"""What stands for a collision mesh: its convex hull, several convex pieces, its box, itself."""
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
 
 @dataclass(frozen=True)
 class ConvertOptions:
-    """Choices for :func:`prehensile.models.convert.convert`.
+    """Choices for :func:`prehensile.models.convert.conversion.convert`.
 
     Attributes:
         name: of the model and its file; "" for that in the source.
@@ -28,6 +28,8 @@ class ConvertOptions:
             is in (the nearest folder above with a ``package.xml``), else the file's own folder.
         base: "source" as the file has it, "fixed" welds the root link to the world, "free" does
             away with a weld to the world.
+        actuators: "source" drives the joints that the file says are driven (all, if it says
+            nothing), "all" drives every joint that moves and follows no other.
         skip_missing: leave out meshes that cannot be found, instead of refusing.
     """
 
@@ -39,6 +41,7 @@ class ConvertOptions:
     packages: Mapping[str, str | Path] = field(default_factory=dict)
     root: Path | None = None
     base: str = "source"
+    actuators: str = "source"
     skip_missing: bool = False
 
     def __post_init__(self) -> None:
@@ -46,8 +49,12 @@ class ConvertOptions:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise InputError(Finding(f"{value:g} is not > 0 and finite", key=f"--{name}"))
-        if self.collision not in COLLISIONS:
-            mend = "one of " + ", ".join(COLLISIONS)
-            raise InputError(Finding(f"unknown choice '{self.collision}'", mend, key="--collision"))
-        if self.base not in ("source", "fixed", "free"):
-            raise InputError(Finding(f"unknown choice '{self.base}'", "source, fixed or free"))
+        for name, choices in (
+            ("collision", COLLISIONS),
+            ("base", ("source", "fixed", "free")),
+            ("actuators", ("source", "all")),
+        ):
+            value = getattr(self, name)
+            if value not in choices:
+                mend = "one of " + ", ".join(choices)
+                raise InputError(Finding(f"unknown choice '{value}'", mend, key=f"--{name}"))

@@ -18,13 +18,17 @@ from prehensile.models.convert.xml_text import remove
 from prehensile.models.xml_lines import Element
 
 # What describes other programs' business.
-_FOREIGN = ("gazebo", "plugin", "sensor", "ros2_control", "sdf_robot", "gripper", "light")
+_FOREIGN = (
+    *("gazebo", "plugin", "sensor", "ros2_control", "light"),
+    *("safety_controller", "calibration"),
+)
 
 
 def check_urdf(robot: Element, source: Source) -> None:
     """Refuses what is not a URDF yet: a macro file."""
     for element in robot.walk():
-        if element.tag.startswith("xacro:") or "${" in "".join(element.attributes.values()):
+        text = " ".join([*element.attributes.values(), element.text])
+        if element.tag.startswith("xacro:") or "${" in text or "$(" in text:
             source.fault(
                 element,
                 "this is a xacro file: macros, not yet a robot",
@@ -43,14 +47,14 @@ def sdf_model(root: Element, source: Source) -> Element:
         source.raise_findings()
     models = [m for top in (root, *root.all("world")) for m in top.all("model")]
     if len(models) != 1:
-        source.fault(
-            root, f"the file holds {len(models)} models", "keep the one to be converted"
-        )
+        source.fault(root, f"the file holds {len(models)} models", "keep the one to be converted")
     for element in root.walk():
         if element.tag == "include":
             mend = "expand it first: gz sdf -p FILE"
             source.fault(element, "the file includes another", mend, "include")
     source.raise_findings()
+    # A link of this name, which Drake refuses, is how Bullet's files name the world.
+    models[0].children = [c for c in models[0].children if (c.tag, c.name) != ("link", "world")]
     return models[0]
 
 
@@ -67,7 +71,7 @@ def mend_tree(
     if not tree.links:
         source.fault(model, "there are no links in it", "add a <link>")
     source.raise_findings()
-    joints = JointMender(model, tree, source, report, urdf)
+    joints = JointMender(model, tree, source, report, urdf, options.actuators == "all")
     joints.mend()
     joints.set_base(options.base)
     tree = read_tree(model, source)

@@ -1,6 +1,6 @@
 """XML elements made, changed and written; the counterpart of ``xml_lines``, which reads them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
 from prehensile.models.xml_lines import Element
@@ -11,7 +11,7 @@ def number(value: float) -> str:
     return repr(float(value) + 0.0).removesuffix(".0")
 
 
-def numbers(values: Sequence[float]) -> str:
+def numbers(values: Iterable[float]) -> str:
     """Numbers with blanks between them."""
     return " ".join(number(v) for v in values)
 
