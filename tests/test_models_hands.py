@@ -4,10 +4,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.geometry import Role
+from pydrake.geometry import (
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Cylinder,
+    ProximityProperties,
+    Role,
+)
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    CoulombFriction,
+    MultibodyPlant,
+    MultibodyPlantConfig,
+)
 from pydrake.multibody.tree import PdControllerGains
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
@@ -76,6 +87,7 @@ class Bench:
         brick: bool = False,
         time_step: float = 0.004,
         gains: PdControllerGains | None = None,
+        post: tuple[float, float] | None = None,
     ) -> None:
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
@@ -93,10 +105,19 @@ class Bench:
         if brick:
             (instance,) = parser.AddModelsFromUrl(find_model("foam_brick").url)
             self.brick = self.plant.get_body(self.plant.GetBodyIndices(instance)[0])
+        if post:  # a fixed cylinder along y: its radius and height
+            X_WP = RigidTransform(RollPitchYaw(np.pi / 2, 0.0, 0.0), [0.0, 0.0, post[1]])
+            world, shape = self.plant.world_body(), Cylinder(post[0], 0.1)
+            surface = ProximityProperties()
+            AddRigidHydroelasticProperties(0.01, surface)
+            AddContactMaterial(friction=CoulombFriction(0.3, 0.3), properties=surface)
+            self.plant.RegisterCollisionGeometry(world, X_WP, shape, "post", surface)
+            self.plant.RegisterVisualGeometry(world, X_WP, shape, "post", [0.2, 0.5, 0.8, 1.0])
         for index in self.plant.GetJointActuatorIndices() if gains else ():
             self.plant.get_joint_actuator(index).set_controller_gains(gains)
         self.plant.Finalize()
-        self.simulator = Simulator(builder.Build())
+        self.diagram = builder.Build()
+        self.simulator = Simulator(self.diagram)
         self.root = self.simulator.get_mutable_context()
         self.context: Context = self.plant.GetMyMutableContextFromRoot(self.root)
 
@@ -280,3 +301,125 @@ class TestAllegro:
         q = bench.plant.GetPositions(bench.context)
         assert (q > bench.plant.GetPositionLowerLimits() - 0.02).all()
         assert (q < bench.plant.GetPositionUpperLimits() + 0.02).all()
+
+
+# The linkage of the 2F-85 as published, at +x of the base: hinges of the outer knuckle on the
+# base, of the inner knuckle there, and what leads from the first to the inner finger's.
+HINGE_A, HINGE_D = np.array([0.03060114, 0.05490452]), np.array([0.0127, 0.06142])
+CRANK = np.array([0.03152616 + 0.00563134, -0.00376347 + 0.04718515])
+
+
+def parallel(q: float) -> list[float]:
+    """Positions of a finger's joints while it is a parallelogram."""
+    return [q, 0.0, -q, q]
+
+
+def inner_finger(q: float) -> np.ndarray:
+    """x and z of the inner finger's hinge on the crank."""
+    c, s = np.cos(q), np.sin(q)
+    return HINGE_A + [c * CRANK[0] - s * CRANK[1], s * CRANK[0] + c * CRANK[1]]
+
+
+def lean(bench: Bench, side: str) -> float:
+    """Angle by which a tip leans inwards, rad."""
+    z = bench.pose(f"{side}_inner_finger").rotation().col(2)
+    return float(np.arctan2(-z[0] if side == "left" else z[0], z[2]))
+
+
+class TestRobotiq:
+    def test_one_motor_and_three_constraints(self) -> None:
+        plant = Bench("robotiq_2f85", "robotiq_base_link").plant
+        assert plant.num_actuators() == 1
+        assert plant.num_positions() == 8
+        assert plant.num_constraints() == 3  # two loops, and one finger follows the other
+
+    @pytest.mark.parametrize("fraction", [0.0, 0.3, 0.7, 1.0])
+    def test_opening_of_parallel_pads(self, fraction: float) -> None:
+        bench = Bench("robotiq_2f85", "robotiq_base_link")
+        joint = bench.plant.GetJointByName("finger_joint")
+        q = fraction * float(joint.position_upper_limits()[0])
+        bench.plant.SetPositions(bench.context, 2 * parallel(q))
+        x, _ = inner_finger(q)
+        opening = 0.085 - 2.0 * (inner_finger(0.0)[0] - x)
+        assert opening == pytest.approx({0.0: 0.085, 1.0: 0.0}.get(fraction, opening), abs=1e-6)
+        middle = bench.pose("left_pad").translation()
+        distances = bench.distance(np.array([0.0, 0.002, middle[2] + 0.005]), "pad")
+        np.testing.assert_allclose(distances, opening / 2, atol=1e-6)
+        # Closed, it is 162.8 mm long from the coupling to the end of the pads.
+        if fraction == 1.0:
+            assert middle[2] + 0.0375 / 2 == pytest.approx(0.1628, abs=3e-4)
+
+    @pytest.mark.parametrize("time_step", [0.002, 0.005])
+    def test_moves_as_a_parallelogram_with_its_loops_closed(self, time_step: float) -> None:
+        bench = Bench("robotiq_2f85", "robotiq_base_link", time_step=time_step)
+        bench.push([3.0])
+        q = 0.0
+        for step in range(30):
+            bench.simulator.AdvanceTo(0.03 * (step + 1))
+            q = bench.joint("finger_joint")
+            assert bench.joint("right_outer_knuckle_joint") == pytest.approx(q, abs=1e-5)
+            for name, side in (("left", 1.0), ("right", -1.0)):
+                X_WT = bench.pose(f"{name}_inner_finger")
+                x, z = inner_finger(q)
+                np.testing.assert_allclose(X_WT.translation(), [side * x, 0, z], atol=2e-5)
+                assert abs(lean(bench, name)) < 5e-4
+                # The hinge where the loop is closed, seen from both of its links.
+                u, w = HINGE_D - HINGE_A
+                on_knuckle = bench.pose(f"{name}_inner_knuckle") @ [side * CRANK[0], 0, CRANK[1]]
+                gap = X_WT @ np.array([side * u, 0.0, w]) - on_knuckle
+                assert np.linalg.norm(gap) < 1e-6
+        assert q == pytest.approx(0.8014, abs=1e-3)  # closed in less than a second
+
+    def test_pinches_and_encompasses(self) -> None:
+        # A post between the pads leaves the outer fingers on their stops; one that the inner
+        # knuckles meet first is held by bent fingers.
+        pinched = Bench("robotiq_2f85", "robotiq_base_link", post=(0.02, 0.152))
+        wrapped = Bench("robotiq_2f85", "robotiq_base_link", post=(0.026, 0.105))
+        for bench in (pinched, wrapped):
+            bench.push([3.0])
+            bench.simulator.AdvanceTo(1.2)
+            assert np.abs(bench.plant.GetVelocities(bench.context)).max() < 0.05
+        for side in ("left", "right"):
+            assert abs(pinched.joint(f"{side}_outer_finger_joint")) < 1e-3
+            assert abs(lean(pinched, side)) < 3e-3
+            assert wrapped.joint(f"{side}_outer_finger_joint") < -0.3
+            assert lean(wrapped, side) > 0.5
+        # Virtual work: torque times turn is the two fingers' force times the pads' way.
+        rate = np.linalg.norm(CRANK) * np.sin(
+            np.arctan2(CRANK[1], CRANK[0]) + pinched.joint("finger_joint")
+        )
+        results = pinched.plant.get_contact_results_output_port().Eval(pinched.context)
+        assert results.num_point_pair_contacts() == 0
+        assert results.num_hydroelastic_contacts() == 2
+        contacts = [results.hydroelastic_contact_info(i) for i in range(2)]
+        forces = [abs(contact.F_Ac_W().translational()[0]) for contact in contacts]
+        assert sum(forces) == pytest.approx(3.0 / rate, rel=0.06)  # but for friction
+        # Round the post there are four contacts: both pads, and the metal of both inner knuckles.
+        results = wrapped.plant.get_contact_results_output_port().Eval(wrapped.context)
+        assert results.num_hydroelastic_contacts() == 2
+        assert results.num_point_pair_contacts() >= 2
+
+    def test_holds_a_brick(self) -> None:
+        bench = Bench("robotiq_2f85", "grasp_frame", FINGERS_DOWN, brick=True)
+        assert bench.brick is not None
+        bench.plant.SetPositions(bench.context, bench.hand, 2 * parallel(0.35))
+        X_WB = RigidTransform([0.0, 0.0, -0.013])
+        bench.plant.SetFreeBodyPose(bench.context, bench.brick, X_WB)
+        bench.push([4.0])
+        bench.simulator.AdvanceTo(0.15)
+        X_WB = bench.pose_of_brick()
+        bench.simulator.AdvanceTo(1.15)
+        moved = X_WB.InvertAndCompose(bench.pose_of_brick())
+        assert np.linalg.norm(moved.translation()) < 1e-3
+        assert moved.rotation().ToAngleAxis().angle() < np.radians(1.0)
+
+    def test_full_force_on_nothing_breaks_nothing(self) -> None:
+        sideways = RigidTransform(RollPitchYaw(0.0, np.pi / 2, 0.3), np.zeros(3))
+        bench = Bench("robotiq_2f85", "robotiq_base_link", sideways, time_step=0.005)
+        for time, effort in ((0.5, 26.0), (1.0, -26.0), (1.5, 26.0)):
+            bench.push([effort])
+            bench.simulator.AdvanceTo(time)
+            q = bench.plant.GetPositions(bench.context)
+            end = 0.8014 if effort > 0 else 0.0
+            np.testing.assert_allclose(q, 2 * parallel(end), atol=0.01)
+            assert np.abs(bench.plant.GetVelocities(bench.context)).max() < 1e-2

@@ -19,6 +19,7 @@ MODELS = (
     "panda_hand",
     "allegro_right",
     "allegro_left",
+    "robotiq_2f85",
     "d415",
     "table",
     "bin",

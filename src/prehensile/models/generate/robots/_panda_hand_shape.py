@@ -35,7 +35,7 @@ def pad_volume(side: int) -> str:
     """The pad of the finger on the ``side`` (1 or -1) of y as a volume mesh, in its frame."""
     R_LP = RotationMatrix(np.column_stack([(0, side, 0), (0, 0, 1), (side, 0, 0)]))
     X_LP = RigidTransform(R_LP, [0.0, 0.0, PAD_Z])
-    return pad_mesh(X_LP, PAD_LENGTH, PAD_WIDTH, depth=0.012, core=0.004)
+    return pad_mesh(X_LP, PAD_LENGTH, PAD_WIDTH, depth=0.0125, core=0.006, count=2)
 
 
 def hand_parts() -> list[Part]:

@@ -51,7 +51,7 @@ DRIVE_MASS = 1.0  # kg
 
 PLASTIC = Contact(mu=0.4, relaxation_time=0.05)
 METAL = Contact(mu=0.6, relaxation_time=0.02)
-RUBBER = Contact(mu=1.0, hydroelastic="compliant", modulus=2e6, relaxation_time=0.02)
+RUBBER = Contact(mu=1.0, hydroelastic="compliant", modulus=3e6, relaxation_time=0.01)
 
 
 def model(*, boxes_for_pads: bool = False) -> Model:
