@@ -1,13 +1,18 @@
 """What the housings of all arms are made with: shells cut off at the joints, and rings there."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from prehensile.models.shapes import Material, Mesh, Part, cylinder
-from prehensile.models.shapes.implicit import Field, drum, polygonize, split
+from prehensile.models.shapes.implicit import Field, drum, polygonize, split, union
 
 GAP = 0.0016
 """Half of what is between two links, m."""
+
+FADE = 0.02
+"""Width of the zone at a joint in which fillets fade out, m."""
 
 DARK = Material("dark", (0.03, 0.031, 0.034, 1.0), metallic=0.0, roughness=0.6)
 
@@ -19,6 +24,30 @@ def shell(body: Field, low: ArrayLike, high: ArrayLike, step: float) -> Mesh:
     """The surface of a body in a box; the box is widened for the body to lie inside it."""
     margin = 2.0 * step
     return polygonize(body, np.asarray(low) - margin, np.asarray(high) + margin, step)
+
+
+def joined(*fields: Field, blend: float, ends: Sequence[tuple[ArrayLike, ArrayLike]] = ()) -> Field:
+    """The union of fields with fillets, which fade out towards the joints.
+
+    A fillet beside a joint would make the drum there wider than that of the next link.
+
+    Args:
+        fields: the drums and tubes of a link.
+        blend: width of the fillets, m.
+        ends: for each joint a point of its plane and the unit vector from there into the link.
+    """
+    smooth, sharp = union(*fields, blend=blend), union(*fields, blend=0.0)
+    planes = [(np.asarray(at, float), np.asarray(inwards, float)) for at, inwards in ends]
+
+    def field(p: np.ndarray) -> np.ndarray:
+        weight = np.ones(p.shape[:-1])
+        for at, inwards in planes:
+            t = np.clip((p - at) @ inwards / FADE, 0.0, 1.0)
+            weight = weight * t * t * (3.0 - 2.0 * t)
+        plain = sharp(p)
+        return plain + weight * (smooth(p) - plain)
+
+    return field
 
 
 def kept(mesh: Mesh, body: Field, *planes: Plane) -> Mesh:

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from prehensile.models.generate.robots._housing import DARK, GAP, disc, kept, ring, shell, without
+from prehensile.models.generate.robots._housing import (
+    DARK,
+    GAP,
+    disc,
+    joined,
+    kept,
+    ring,
+    shell,
+    without,
+)
 from prehensile.models.shapes import Material, Part, cylinder, lathe, merge
 from prehensile.models.shapes.implicit import cone, drum, rounded_block, union
 
@@ -23,12 +32,13 @@ def _band(radius: float, at: np.ndarray, along: np.ndarray, width: float = 0.009
 
 def base() -> list[Part]:
     """Link 0: a foot on two broad toes, with the plugs behind, and the neck."""
-    body = union(
+    body = joined(
         rounded_block((-0.132, -0.07, -0.06), (0.0, 0.07, 0.088), 0.03),
         rounded_block((-0.12, -0.095, -0.06), (-0.04, 0.095, 0.028), 0.014),
         drum((0, 0, -0.06), (0, 0, 0.026), 0.072, 0.012),
         drum((0, 0, -0.06), (0, 0, 0.2), R, 0.01),
         blend=0.045,
+        ends=[(0.14 * Z, -Z)],
     )
     mesh = shell(body, (-0.16, -0.12, -0.07), (0.1, 0.12, 0.2), STEP)
     mesh = kept(mesh, body, (2, 0.0, 1.0), (2, 0.14 - GAP, -1.0))
@@ -43,11 +53,12 @@ def base() -> list[Part]:
 
 def _shoulder(low: float) -> list[Part]:
     """Link 1: a tube that stands on z at ``low``, and a drum on y whose face is at y = 0."""
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.05), (0, 0, -0.105), R, 0.02),
         cone((0, 0, -0.105), (0, -0.055, -0.015), R - 0.002, R - 0.002),
         drum((0, -0.129, 0), (0, 0.05, 0), R, 0.034),
         blend=0.03,
+        ends=[(low * Z, Z)],
     )
     mesh = shell(body, (-0.07, -0.14, low - 0.06), (0.07, 0.08, 0.07), STEP)
     mesh = kept(mesh, body, (2, low + GAP, 1.0))
@@ -57,11 +68,12 @@ def _shoulder(low: float) -> list[Part]:
 
 def _elbow(low: float) -> list[Part]:
     """Link 3: a tube that stands on z at ``low``, and a drum before it, its face at y = 0."""
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.05), (0, 0, -0.06), R, 0.02),
         cone((0, 0, -0.07), (0.07, 0.055, -0.01), R - 0.004, R - 0.006),
         drum((0.0825, -0.05, 0), (0.0825, 0.111, 0), R, 0.034),
         blend=0.03,
+        ends=[(low * Z, Z)],
     )
     mesh = shell(body, (-0.07, -0.08, low - 0.06), (0.15, 0.12, 0.07), STEP)
     mesh = kept(mesh, body, (2, low + GAP, 1.0))
@@ -78,12 +90,13 @@ def _turned(parts: list[Part], columns: tuple[np.ndarray, ...], x: float) -> lis
 def forearm() -> list[Part]:
     """Link 5: a tube that narrows to a flat arm beside the wrist, with a drum on its axis."""
     low, r = -0.259, 0.05
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.05), (0, 0, -0.215), R, 0.02),
         cone((0, 0, -0.2), (0, 0.078, -0.135), R - 0.008, 0.03),
         cone((0, 0.08, -0.15), (0, 0.086, -0.02), 0.031, 0.034),
         drum((0, -0.04, 0), (0, 0.13, 0), r, 0.03),
         blend=0.035,
+        ends=[(low * Z, Z)],
     )
     mesh = shell(body, (-0.07, -0.08, low - 0.06), (0.07, 0.14, 0.06), STEP)
     mesh = kept(mesh, body, (2, low + GAP, 1.0))
@@ -94,11 +107,12 @@ def forearm() -> list[Part]:
 def wrist() -> list[Part]:
     """Link 6: a drum on its own joint, a barrel about the next, off to the front."""
     r, face = 0.048, -0.0515
-    body = union(
+    body = joined(
         drum((0, 0, -0.07), (0, 0, 0.055), r, 0.02),
         cone((0, 0, 0.015), (0.07, 0.012, 0), 0.036, 0.038),
         drum((0.088, face - 0.04, 0), (0.088, 0.082, 0), 0.0445, 0.018),
         blend=0.03,
+        ends=[(face * Y, Y)],
     )
     mesh = shell(body, (-0.06, -0.1, -0.08), (0.14, 0.09, 0.07), STEP)
     mesh = without(mesh, body, (0, 0, -0.015 + GAP), (0, 0, -0.3), r)
@@ -110,7 +124,7 @@ def flange() -> list[Part]:
     """Link 7: the disc that tools are screwed to, and the knob with the buttons."""
     low, high = 0.0515 + GAP, 0.107
     body = union(
-        drum((0, 0, low - 0.03), (0, 0, 0.098), 0.0435, 0.003),
+        drum((0, 0, low - 0.03), (0, 0, 0.098), 0.0435, 0.008),
         drum((0.048, 0.048, 0.071), (0.048, 0.048, 0.097), 0.025, 0.008),
         cone((0.02, 0.02, 0.08), (0.045, 0.045, 0.084), 0.014, 0.012),
         blend=0.02,

@@ -11,18 +11,20 @@ from prehensile.models.generate.robots._housing import (
     Plane,
     disc,
     divided,
+    joined,
     kept,
     ring,
     shell,
 )
 from prehensile.models.shapes import Material, Part, cylinder, lathe, merge
-from prehensile.models.shapes.implicit import Field, drum, union
+from prehensile.models.shapes.implicit import Field, drum
 
 LIGHT = Material("light grey", (0.78, 0.79, 0.80, 1.0), metallic=0.0, roughness=0.4)
 GREY = Material("joint grey", (0.40, 0.41, 0.42, 1.0), metallic=0.0, roughness=0.5)
 BLUE = Material("blue", (0.28, 0.55, 0.74, 1.0), metallic=0.0, roughness=0.4)
 
 STEP = 0.0085  # m, edge of the triangles
+AXES = np.eye(3)
 _CORNERS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) / np.sqrt(2.0)
 
 
@@ -105,10 +107,15 @@ def base(b: Build) -> list[Part]:
 
 
 def _joined(
-    drums: Sequence[Field], blend: float, reach: float, planes: Sequence[Plane], lid: Plane
+    drums: Sequence[Field],
+    blend: float,
+    reach: float,
+    planes: Sequence[Plane],
+    lid: Plane,
 ) -> list[Part]:
     """Drums that flow into one another, cut off at the joints, and a blue lid on one end."""
-    body = union(*drums, blend=blend)
+    ends = [(place * AXES[axis], sign * AXES[axis]) for axis, place, sign in planes]
+    body = joined(*drums, blend=blend, ends=ends)
     mesh = kept(shell(body, (-reach,) * 3, (reach,) * 3, STEP), body, *planes)
     housing, cover = divided(mesh, body, lid)
     return [Part(housing, GREY), Part(cover, BLUE)]
@@ -150,7 +157,8 @@ def _end(
     z, radius, to = tube
     barrel = drum((x, 0, face - 0.05 * sign), (x, 0, lid), r, 0.018)
     socket = drum((x, 0, z), (to, 0, z), radius, 0.002)
-    body = union(barrel, socket, blend=0.03)
+    end = ((x, 0, face), (0, 0, sign))
+    body = joined(barrel, socket, blend=0.03, ends=[end])
     low = (min(x, to) - r, -r - 0.01, min(face - 0.05, lid))
     high = (max(x, to) + r, r + 0.01, max(face + 0.05, lid))
     mesh = kept(shell(body, low, high, STEP), body, (2, face + GAP * sign, sign))

@@ -2,9 +2,18 @@
 
 import numpy as np
 
-from prehensile.models.generate.robots._housing import DARK, GAP, disc, kept, ring, shell, without
+from prehensile.models.generate.robots._housing import (
+    DARK,
+    GAP,
+    disc,
+    joined,
+    kept,
+    ring,
+    shell,
+    without,
+)
 from prehensile.models.shapes import Material, Mesh, Part, cylinder, lathe, merge
-from prehensile.models.shapes.implicit import Field, cone, drum, rounded_block, slab, union
+from prehensile.models.shapes.implicit import Field, cone, drum, rounded_block, slab
 
 WHITE = Material("white", (0.95, 0.95, 0.95, 1.0), metallic=0.0, roughness=0.4)
 STEEL = Material("steel", (0.55, 0.56, 0.57, 1.0), metallic=0.2, roughness=0.4)
@@ -55,10 +64,11 @@ def _shell(body: Field, low: tuple[float, float, float], high: tuple[float, floa
 def link_1() -> list[Part]:
     """A tube, and a drum on y that carries the upper arm on its +y side."""
     low, face, r = -0.112, 0.075, 0.0475
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.04), (0, 0, -0.03), r, 0.01),
         drum((0, -0.057, 0), (0, face + 0.04, 0), r, 0.016),
         blend=0.02,
+        ends=[(low * Z, Z), (face * Y, -Y)],
     )
     mesh = _shell(body, (-r, -0.06, low - 0.04), (r, face + 0.04, r + 0.005))
     mesh = kept(mesh, body, (2, low + GAP, 1.0), (1, face - GAP, -1.0))
@@ -68,11 +78,12 @@ def link_1() -> list[Part]:
 def link_2() -> list[Part]:
     """A plate beside the shoulder, and a tube back on its axis."""
     low, end, r = 0.075, -0.192, 0.0475
-    body = union(
+    body = joined(
         _plate((0.0, -0.09), r, low + GAP, 0.119),
         rounded_block((-0.045, -0.152, -0.034), (0.045, -0.062, 0.117), 0.032),
         drum((0, end - 0.04, 0), (0, -0.08, 0), 0.042, 0.01),
         blend=0.016,
+        ends=[(end * Y, Y)],
     )
     mesh = _shell(body, (-r, end - 0.04, -0.045), (r, r, 0.12))
     mesh = kept(mesh, body, (1, end + GAP, 1.0))
@@ -82,11 +93,12 @@ def link_2() -> list[Part]:
 def link_3() -> list[Part]:
     """A tube, and a drum on y before it that carries the forearm on its -y side."""
     low, face, r = -0.101, -0.067, 0.0425
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.04), (0, 0, -0.055), 0.042, 0.01),
         cone((0, 0, -0.055), (0.045, 0.005, -0.01), 0.037, 0.037),
         drum((0.0525, face - 0.04, 0), (0.0525, 0.069, 0), r, 0.014),
         blend=0.022,
+        ends=[(low * Z, Z), (face * Y, Y)],
     )
     mesh = _shell(body, (-r, face - 0.04, low - 0.04), (0.1, 0.07, 0.045))
     mesh = kept(mesh, body, (2, low + GAP, 1.0), (1, face + GAP, 1.0))
@@ -96,11 +108,12 @@ def link_3() -> list[Part]:
 def link_4() -> list[Part]:
     """A plate beside the elbow, and a tube before it."""
     low, end, r, x = 0.067, -0.169, 0.0425, 0.0775
-    body = union(
+    body = joined(
         _plate((x - 0.003, -0.08), r, low + GAP, 0.107),
         rounded_block((x - 0.041, -0.127, -0.034), (x + 0.041, -0.045, 0.105), 0.03),
         drum((x, end - 0.04, 0), (x, -0.07, 0), 0.042, 0.01),
         blend=0.016,
+        ends=[(end * Y, Y)],
     )
     mesh = _shell(body, (-r, end - 0.04, -0.045), (x + 0.045, r, 0.11))
     mesh = kept(mesh, body, (1, end + GAP, 1.0))
@@ -110,12 +123,13 @@ def link_4() -> list[Part]:
 def link_5() -> list[Part]:
     """A tube that leans over to a plate beside the wrist."""
     low, face, r = -0.173, 0.005, 0.0375
-    body = union(
-        drum((0, 0, low - 0.04), (0, 0, -0.145), 0.0425, 0.01),
+    body = joined(
+        drum((0, 0, low - 0.04), (0, 0, -0.145), 0.042, 0.01),
         cone((0, 0, -0.15), (0, 0.058, -0.09), 0.036, 0.026),
         rounded_block((-r, 0.05, -0.105), (r, 0.086, 0.0), 0.012),
         drum((0, face - 0.03, 0), (0, 0.086, 0), r, 0.012),
         blend=0.02,
+        ends=[(low * Z, Z)],
     )
     mesh = _shell(body, (-0.045, -0.045, low - 0.04), (0.045, 0.09, 0.04))
     mesh = without(mesh, body, (0, face + GAP, 0), (0, -0.3, 0), r)
@@ -126,11 +140,12 @@ def link_5() -> list[Part]:
 def link_6() -> list[Part]:
     """A drum on its own joint, and a tube before it, down to the flange."""
     low, end, r, x = -0.005, 0.069, 0.0375, 0.076
-    body = union(
+    body = joined(
         drum((0, 0, low - 0.03), (0, 0, 0.058), r, 0.012),
         cone((0.01, 0, 0.025), (x, 0, 0.007), 0.027, 0.03),
         drum((x, -0.035, 0), (x, end + 0.04, 0), r, 0.012),
         blend=0.022,
+        ends=[(end * Y, -Y)],
     )
     mesh = _shell(body, (-r, -0.045, low - 0.04), (x + 0.04, end + 0.04, 0.06))
     mesh = without(mesh, body, (0, 0, low + GAP), (0, 0, -0.3), r)
