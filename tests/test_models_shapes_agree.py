@@ -20,6 +20,7 @@ MODELS = (
     "allegro_right",
     "allegro_left",
     "robotiq_2f85",
+    "suction_cup",
     "d415",
     "table",
     "bin",
