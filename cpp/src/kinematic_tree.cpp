@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "chain_walk.h"
+#include "kinematics_lanes.h"
 #include "parallel.h"
 #include "sincos.h"
 
@@ -26,12 +28,6 @@ class Scratch {
  private:
   std::array<T, kFew> few_;
   std::vector<T> many_;
-};
-
-/// The axis of a joint in W, and where it is.
-struct WorldAxis {
-  double z[3];
-  double p[3];
 };
 
 constexpr std::size_t kFewJoints = 32;
@@ -98,76 +94,41 @@ KinematicTree::KinematicTree(const std::vector<TreeJoint>& joints,
     Eigen::Matrix3d R_LJ = Eigen::Matrix3d::Identity();
     for (const int i : way) {
       const Eigen::Matrix4d& X_PJ = joints[i].X_PJ;
-      Step step;
-      Eigen::Map<RowMatrix3>(step.R_PL.data()) = R_LJ * X_PJ.topLeftCorner<3, 3>() * R_JL[i];
-      Eigen::Map<Eigen::Vector3d>(step.p_PL.data()) = R_LJ * X_PJ.topRightCorner<3, 1>();
+      internal::ChainStep step;
+      Eigen::Map<RowMatrix3>(step.R_PL) = R_LJ * X_PJ.topLeftCorner<3, 3>() * R_JL[i];
+      Eigen::Map<Eigen::Vector3d>(step.p_PL) = R_LJ * X_PJ.topRightCorner<3, 1>();
       step.joint = i;
       step.prismatic = joints[i].type == JointType::kPrismatic;
       chain.steps.push_back(step);
       R_LJ = R_JL[i].transpose();
     }
     const Eigen::Matrix4d& X_PF = frames[k].X_PF;
-    Eigen::Map<RowMatrix3>(chain.R_LF.data()) = R_LJ * X_PF.topLeftCorner<3, 3>();
-    Eigen::Map<Eigen::Vector3d>(chain.p_LF.data()) = R_LJ * X_PF.topRightCorner<3, 1>();
+    Eigen::Map<RowMatrix3>(chain.view.R_LF) = R_LJ * X_PF.topLeftCorner<3, 3>();
+    Eigen::Map<Eigen::Vector3d>(chain.view.p_LF) = R_LJ * X_PF.topRightCorner<3, 1>();
+    chain.view.num_steps = static_cast<int>(chain.steps.size());
     frames_.push_back(std::move(chain));
   }
 }
 
 void KinematicTree::PoseAndJacobian(const double* q, int frame, double* X_WF, double* J_WF) const {
-  const Chain& chain = frames_[frame];
-  const std::size_t num_steps = chain.steps.size();
-  Scratch<double, kFewJoints> sines(num_steps), cosines(num_steps);
-  Scratch<WorldAxis, kFewJoints> axes(num_steps);
-  double* const sine = sines.data();
-  double* const cosine = cosines.data();
-  WorldAxis* const axis = axes.data();
-  for (std::size_t i = 0; i < num_steps; ++i) {
-    const Step& step = chain.steps[i];
-    if (!step.prismatic) internal::SinCos(q[step.joint], &sine[i], &cosine[i]);
-  }
-
-  // The columns of R_WL, and p_WL.
-  double x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, z[3] = {0, 0, 1}, p[3] = {0, 0, 0};
-  for (std::size_t i = 0; i < num_steps; ++i) {
-    const Step& step = chain.steps[i];
-    const double* const R = step.R_PL.data();
-    const double* const t = step.p_PL.data();
-    if (step.prismatic) {
-      const double d = q[step.joint];
-      for (int k = 0; k < 3; ++k) {
-        const double xk = x[k], yk = y[k], zk = z[k];
-        p[k] += xk * t[0] + yk * t[1] + zk * t[2];
-        x[k] = xk * R[0] + yk * R[3] + zk * R[6];
-        y[k] = xk * R[1] + yk * R[4] + zk * R[7];
-        z[k] = xk * R[2] + yk * R[5] + zk * R[8];
-        p[k] += z[k] * d;
-        axis[i].z[k] = z[k];
-        axis[i].p[k] = p[k];
-      }
-    } else {
-      const double s = sine[i], c = cosine[i];
-      for (int k = 0; k < 3; ++k) {
-        const double xk = x[k], yk = y[k], zk = z[k];
-        p[k] += xk * t[0] + yk * t[1] + zk * t[2];
-        const double x0 = xk * R[0] + yk * R[3] + zk * R[6];
-        const double y0 = xk * R[1] + yk * R[4] + zk * R[7];
-        z[k] = xk * R[2] + yk * R[5] + zk * R[8];
-        x[k] = x0 * c + y0 * s;
-        y[k] = y0 * c - x0 * s;
-        axis[i].z[k] = z[k];
-        axis[i].p[k] = p[k];
-      }
+  const internal::ChainView way = chain(frame);
+  const int num_steps = way.num_steps;
+  Scratch<double, 3 * kFewJoints> angles(3 * num_steps);
+  Scratch<internal::WorldAxis<double>, kFewJoints> axes(num_steps);
+  double* const sine = angles.data();
+  double* const cosine = sine + num_steps;
+  double* const position = cosine + num_steps;
+  for (int i = 0; i < num_steps; ++i) {
+    position[i] = q[way.steps[i].joint];
+    if (!way.steps[i].prismatic) {
+      internal::SinCosReduced(internal::WithinRange(position[i]), &sine[i], &cosine[i]);
     }
   }
-  const double* const R = chain.R_LF.data();
-  const double* const t = chain.p_LF.data();
-  for (int k = 0; k < 3; ++k) p[k] += x[k] * t[0] + y[k] * t[1] + z[k] * t[2];
-
+  double R[9], p[3];
+  internal::WalkChain(way, sine, cosine, position, R, p, axes.data());
   if (X_WF) {
     for (int k = 0; k < 3; ++k) {
-      X_WF[4 * k] = x[k] * R[0] + y[k] * R[3] + z[k] * R[6];
-      X_WF[4 * k + 1] = x[k] * R[1] + y[k] * R[4] + z[k] * R[7];
-      X_WF[4 * k + 2] = x[k] * R[2] + y[k] * R[5] + z[k] * R[8];
+      for (int j = 0; j < 3; ++j) X_WF[4 * k + j] = R[3 * k + j];
       X_WF[4 * k + 3] = p[k];
       X_WF[12 + k] = 0;
     }
@@ -175,23 +136,11 @@ void KinematicTree::PoseAndJacobian(const double* q, int frame, double* X_WF, do
   }
   if (J_WF) {
     const int n = num_joints_;
-    if (num_steps != static_cast<std::size_t>(n)) std::fill_n(J_WF, 6 * n, 0.0);
-    for (std::size_t i = 0; i < num_steps; ++i) {
-      const double* const a = axis[i].z;
-      double* const column = J_WF + chain.steps[i].joint;
-      if (chain.steps[i].prismatic) {
-        for (int k = 0; k < 3; ++k) {
-          column[k * n] = 0;
-          column[(3 + k) * n] = a[k];
-        }
-      } else {
-        const double* const o = axis[i].p;
-        const double r[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
-        for (int k = 0; k < 3; ++k) column[k * n] = a[k];
-        column[3 * n] = a[1] * r[2] - a[2] * r[1];
-        column[4 * n] = a[2] * r[0] - a[0] * r[2];
-        column[5 * n] = a[0] * r[1] - a[1] * r[0];
-      }
+    if (num_steps != n) std::fill_n(J_WF, 6 * n, 0.0);
+    for (int i = 0; i < num_steps; ++i) {
+      double column[6];
+      internal::JacobianColumn(axes.data()[i], way.steps[i].prismatic, p, column);
+      for (int k = 0; k < 6; ++k) J_WF[k * n + way.steps[i].joint] = column[k];
     }
   }
 }
@@ -236,22 +185,43 @@ void KinematicTree::PosesAndJacobians(const double* Q, std::size_t N, int frame,
   const auto num_shares =
       static_cast<int>(std::clamp<std::size_t>(N / kRowsPerThread, 1, num_threads));
   const auto n = static_cast<std::size_t>(num_joints_);
+  const internal::ChainView way = chain(frame);
+  if (way.num_steps > internal::kMostSteps) {
+    for (std::size_t i = 0; i < N; ++i) {
+      PoseAndJacobian(Q + n * i, frame, X ? X + 16 * i : nullptr, J ? J + 6 * n * i : nullptr);
+    }
+    return;
+  }
   internal::RunParallel(num_shares, [&](int share) {
     const std::size_t begin = N * share / num_shares, end = N * (share + 1) / num_shares;
-    for (std::size_t i = begin; i < end; ++i) {
-      PoseAndJacobian(Q + n * i, frame, X ? X + 16 * i : nullptr, J ? J + 6 * n * i : nullptr);
+    internal::LaneRoom room;
+    for (std::size_t i = begin; i < end; i += internal::kLanes) {
+      const auto count = static_cast<int>(std::min<std::size_t>(end - i, internal::kLanes));
+      room.Walk(way, Q + n * i, num_joints_, count, J != nullptr);
+      for (int lane = 0; X && lane < count; ++lane) room.Pose(lane, X + 16 * (i + lane));
+      for (int lane = 0; J && lane < count; ++lane) {
+        double* const rows = J + 6 * n * (i + lane);
+        if (static_cast<std::size_t>(way.num_steps) != n) std::fill_n(rows, 6 * n, 0.0);
+        for (int step = 0; step < way.num_steps; ++step) {
+          double* const column = rows + way.steps[step].joint;
+          for (int k = 0; k < 6; ++k) column[k * n] = room.columns[step][k][lane];
+        }
+      }
     }
   });
 }
 
 KinematicTree::Ball KinematicTree::ReachOf(int frame, const double* lower,
                                            const double* upper) const {
-  const Chain& chain = frames_[frame];
-  const auto length = [](const std::array<double, 3>& p) { return std::hypot(p[0], p[1], p[2]); };
-  if (chain.steps.empty()) return {chain.p_LF, 0};
+  const internal::ChainView way = chain(frame);
+  const auto length = [](const double* p) { return std::hypot(p[0], p[1], p[2]); };
+  const auto& p_LF = way.p_LF;
+  if (way.num_steps == 0) return {{p_LF[0], p_LF[1], p_LF[2]}, 0};
   // About the first joint's origin, by the lengths of everything that follows.
-  Ball ball{chain.steps.front().p_PL, length(chain.p_LF) - length(chain.steps.front().p_PL)};
-  for (const Step& step : chain.steps) {
+  const double* const first = way.steps[0].p_PL;
+  Ball ball{{first[0], first[1], first[2]}, length(p_LF) - length(first)};
+  for (int i = 0; i < way.num_steps; ++i) {
+    const internal::ChainStep& step = way.steps[i];
     ball.radius += length(step.p_PL);
     if (step.prismatic) {
       ball.radius += std::max(std::abs(lower[step.joint]), std::abs(upper[step.joint]));

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "prehensile/kinematic_chain.h"
+
 namespace prehensile {
 
 enum class JointType { kRevolute, kPrismatic };
@@ -77,20 +79,17 @@ class KinematicTree {
   /// @param lower, upper n joint limits each; only those of prismatic joints matter.
   Ball ReachOf(int frame, const double* lower, const double* upper) const;
 
- private:
-  /// One joint on the way from W to a frame, in a frame L of its own whose z is the axis.
-  struct Step {
-    std::array<double, 9> R_PL;  // Row-major, from the preceding step's L.
-    std::array<double, 3> p_PL;
-    int joint;
-    bool prismatic;
-  };
+  /// The steps on the way to a frame, for the kernels; it lives as long as the tree.
+  internal::ChainView chain(int frame) const {
+    internal::ChainView view = frames_[frame].view;
+    view.steps = frames_[frame].steps.data();
+    return view;
+  }
 
-  /// All steps on the way to a frame, and its pose in the last one's L (or in W).
+ private:
   struct Chain {
-    std::vector<Step> steps;
-    std::array<double, 9> R_LF;
-    std::array<double, 3> p_LF;
+    std::vector<internal::ChainStep> steps;
+    internal::ChainView view;  // Its steps are set by chain().
   };
 
   int num_joints_;
