@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "kinematics_lanes.h"
 #include "parallel.h"
 
 namespace prehensile {
@@ -30,118 +31,89 @@ std::uint64_t Mix(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// J Jᵀ of the rows of J that are asked for.
-template <int kRows>
-class Gram {
- public:
-  Gram(const double* J, int n, const ReachQuery& query) {
-    const int first_row = query.part == ReachPart::kTranslational ? 3 : 0;
-    for (int i = 0; i < kRows; ++i) {
-      const int row_i = first_row + i;
-      for (int j = 0; j <= i; ++j) {
-        const int row_j = first_row + j;
-        double sum = 0;
-        for (int k = 0; k < n; ++k) sum += J[n * row_i + k] * J[n * row_j + k];
-        if (row_i >= 3) sum /= query.length;
-        if (row_j >= 3) sum /= query.length;
-        a_[i][j] = sum;
-      }
-    }
+using internal::kLanes;
+
+constexpr std::int64_t kOutside = -1;
+
+/// Element of the voxel that a lane's frame is in, or kOutside.
+std::int64_t Locate(const ReachVoxels& voxels, double inverse_size, const internal::LaneRoom& room,
+                    int lane) {
+  std::int64_t at = 0;
+  for (int k = 0; k < 3; ++k) {
+    // Compared as numbers of floating point: what is far outside may not fit an integer.
+    const double i =
+        std::floor(room.p[k][lane] * inverse_size) - static_cast<double>(voxels.first[k]);
+    if (!(i >= 0 && i < static_cast<double>(voxels.shape[k]))) return kOutside;
+    at = at * voxels.shape[k] + static_cast<std::int64_t>(i);
   }
-
-  double Trace() const {
-    double sum = 0;
-    for (int i = 0; i < kRows; ++i) sum += a_[i][i];
-    return sum;
-  }
-
-  /// Square root of the determinant of the matrix less shift · I; 0 unless positive definite.
-  double RootOfDeterminant(double shift) const {
-    double l[kRows][kRows];
-    double product = 1;
-    for (int j = 0; j < kRows; ++j) {
-      double d = a_[j][j] - shift;
-      for (int k = 0; k < j; ++k) d -= l[j][k] * l[j][k];
-      if (!(d > 0)) return 0;
-      const double root = std::sqrt(d);
-      product *= root;
-      for (int i = j + 1; i < kRows; ++i) {
-        double sum = a_[i][j];
-        for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
-        l[i][j] = sum / root;
-      }
-    }
-    return product;
-  }
-
-  double SmallestSingularValue() const {
-    Eigen::Matrix<double, kRows, kRows> A;
-    for (int i = 0; i < kRows; ++i) {
-      for (int j = 0; j <= i; ++j) A(i, j) = a_[i][j];
-    }
-    const Eigen::SelfAdjointEigenSolver<decltype(A)> solver(A, Eigen::EigenvaluesOnly);
-    return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
-  }
-
- private:
-  double a_[kRows][kRows];  // Lower triangle.
-};
-
-/// Whether the smallest singular value is possibly larger than the best one so far: A - best² I is
-/// positive definite, up to rounding on the safe side, so that skipping never changes the largest.
-template <int kRows>
-bool MayBeat(const Gram<kRows>& gram, double best) {
-  return gram.RootOfDeterminant(best * best - 1e-12 * gram.Trace()) > 0;
+  return at;
 }
 
-int Nearest(const std::vector<std::array<double, 3>>& directions, const double* a) {
-  double largest = -2;
-  int nearest = 0;
-  for (std::size_t d = 0; d < directions.size(); ++d) {
-    const double cosine =
-        directions[d][0] * a[0] + directions[d][1] * a[1] + directions[d][2] * a[2];
-    if (cosine > largest) {
-      largest = cosine;
-      nearest = static_cast<int>(d);
-    }
+/// Smallest singular value of J, from the lower triangle of J Jᵀ by rows in one lane.
+template <int kRows>
+double SmallestSingularValue(const double (*gram)[kLanes], int lane) {
+  Eigen::Matrix<double, kRows, kRows> A;
+  for (int i = 0, at = 0; i < kRows; ++i) {
+    for (int j = 0; j <= i; ++j, ++at) A(i, j) = gram[at][lane];
   }
-  return nearest;
+  const Eigen::SelfAdjointEigenSolver<decltype(A)> solver(A, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
 }
 
 /// Adds some of the configurations, with nobody else writing to these voxels.
-template <int kRows>
 std::size_t Add(const KinematicTree& tree, const ReachQuery& query, const double* Q, std::size_t N,
                 const ReachVoxels& voxels) {
+  const internal::KinematicsKernel& kernel = internal::BestKinematicsKernel();
+  const internal::ChainView chain = tree.chain(query.frame);
   const int n = tree.num_joints();
+  const int rows = query.part == ReachPart::kBoth ? 6 : 3;
+  const int first_row = query.part == ReachPart::kTranslational ? 3 : 0;
   const double inverse_size = 1 / voxels.voxel_size;
-  std::vector<double> J(6 * n);
-  double X[16];
+  internal::LaneRoom room;
+  alignas(64) double axis[3][kLanes], nearest[kLanes], gram[21][kLanes], shift[kLanes],
+      root[kLanes];
   std::size_t outside = 0;
-  for (std::size_t row = 0; row < N; ++row) {
-    tree.PoseAndJacobian(Q + n * row, query.frame, X, J.data());
-    std::int64_t at = 0;
-    bool inside = true;
+  for (std::size_t begin = 0; begin < N; begin += kLanes) {
+    const auto count = static_cast<int>(std::min<std::size_t>(N - begin, kLanes));
+    room.Walk(chain, Q + n * begin, n, count, true);
     for (int k = 0; k < 3; ++k) {
-      // Compared as numbers of floating point: what is far outside may not fit an integer.
-      const double i =
-          std::floor(X[4 * k + 3] * inverse_size) - static_cast<double>(voxels.first[k]);
-      inside = inside && i >= 0 && i < static_cast<double>(voxels.shape[k]);
-      at = at * voxels.shape[k] + (inside ? static_cast<std::int64_t>(i) : 0);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        axis[k][lane] = room.R[3 * k][lane] * query.axis[0] +
+                        room.R[3 * k + 1][lane] * query.axis[1] +
+                        room.R[3 * k + 2][lane] * query.axis[2];
+      }
     }
-    if (!inside) {
-      ++outside;
-      continue;
+    kernel.nearest(query.directions.data()->data(), static_cast<int>(query.directions.size()),
+                   axis[0], nearest);
+    kernel.gram(room.columns[0][0], chain.num_steps, first_row, rows, 1 / query.length, gram[0]);
+    std::fill_n(shift, kLanes, 0.0);
+    kernel.root_of_determinant(gram[0], rows, shift, root);
+
+    std::int64_t at[kLanes];
+    for (int lane = 0; lane < kLanes; ++lane) {
+      at[lane] = lane < count ? Locate(voxels, inverse_size, room, lane) : kOutside;
+      if (at[lane] == kOutside) {
+        outside += lane < count;
+        continue;
+      }
+      ++voxels.counts[at[lane]];
+      voxels.directions[at[lane]] |= std::uint64_t{1} << static_cast<int>(nearest[lane]);
+      voxels.manipulability[at[lane]] = std::max(voxels.manipulability[at[lane]], root[lane]);
+      // The smallest singular value can be larger than the best so far only if J Jᵀ - best² I is
+      // positive definite: most need no eigenvalues. Rounding is put on the safe side, so that the
+      // largest does not depend on the order.
+      double trace = 0;
+      for (int i = 0; i < rows; ++i) trace += gram[i * (i + 3) / 2][lane];
+      const double best = voxels.singular_value[at[lane]];
+      shift[lane] = best * best - 1e-12 * trace;
     }
-    ++voxels.counts[at];
-    double a[3];
-    for (int k = 0; k < 3; ++k) {
-      a[k] = X[4 * k] * query.axis[0] + X[4 * k + 1] * query.axis[1] + X[4 * k + 2] * query.axis[2];
+    kernel.root_of_determinant(gram[0], rows, shift, root);
+    for (int lane = 0; lane < count; ++lane) {
+      if (at[lane] == kOutside || root[lane] == 0) continue;
+      double& best = voxels.singular_value[at[lane]];
+      best = std::max(best, rows == 6 ? SmallestSingularValue<6>(gram, lane)
+                                      : SmallestSingularValue<3>(gram, lane));
     }
-    voxels.directions[at] |= std::uint64_t{1} << Nearest(query.directions, a);
-    const Gram<kRows> gram(J.data(), n, query);
-    voxels.manipulability[at] = std::max(voxels.manipulability[at], gram.RootOfDeterminant(0));
-    double& best = voxels.singular_value[at];
-    if (MayBeat(gram, best)) best = std::max(best, gram.SmallestSingularValue());
   }
   return outside;
 }
@@ -182,6 +154,10 @@ std::size_t AddToReach(const KinematicTree& tree, const ReachQuery& query, const
     throw std::invalid_argument("directions: must be 1 to 64, not " +
                                 std::to_string(query.directions.size()));
   }
+  if (tree.chain(query.frame).num_steps > internal::kMostSteps) {
+    throw std::invalid_argument("frame: more than " + std::to_string(internal::kMostSteps) +
+                                " joints move it");
+  }
   if (!(query.length > 0) || !std::isfinite(query.length)) {
     throw std::invalid_argument("length: must be positive and finite");
   }
@@ -216,8 +192,7 @@ std::size_t AddToReach(const KinematicTree& tree, const ReachQuery& query, const
       mine.manipulability = room.manipulability.data();
       mine.singular_value = room.singular_value.data();
     }
-    const auto add = query.part == ReachPart::kBoth ? Add<6> : Add<3>;
-    outside[share] = add(tree, query, Q + begin * tree.num_joints(), end - begin, mine);
+    outside[share] = Add(tree, query, Q + begin * tree.num_joints(), end - begin, mine);
   });
   for (const Own& room : own) {
     for (std::size_t i = 0; i < size; ++i) {
