@@ -9,6 +9,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr|data):<code>(~?)([\w.]+)</code>")
+FIGURE = re.compile(r'save_figure\(.*?"(\w+)",?\s*\)', re.DOTALL)
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "build" / "examples"
 CHAPTERS = {
@@ -73,7 +74,7 @@ def _page(path: Path) -> str:
             out.append(re.sub(r"\$(.+?)\$", _formula, text, flags=re.DOTALL))
             continue
         out.append(f"```python\n{body.strip()}\n```")
-        for name in re.findall(r'save_figure\([^"]*"(\w+)"\)', body):
+        for name in FIGURE.findall(body):
             out.append(f"![{name.replace('_', ' ')}]({path.stem}/{name}.png)")
     out.append(f"*The file is `examples/{path.name}`; `.venv/bin/python` runs it.*")
     return "\n\n".join(out)

@@ -16,6 +16,7 @@ from PIL import Image
 from prehensile.viz.figures import FOLDER_VARIABLE
 
 ROOT = Path(__file__).parents[1]
+FIGURE = re.compile(r'save_figure\(.*?"(\w+)",?\s*\)', re.DOTALL)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
@@ -32,7 +33,7 @@ def test_example(path, monkeypatch, tmp_path):
         runpy.run_path(str(path), run_name="__main__")
     finally:
         plt.close("all")
-    wanted = set(re.findall(r'save_figure\([^"]*"(\w+)"\)', path.read_text()))
+    wanted = set(FIGURE.findall(path.read_text()))
     drawn = {picture.stem for picture in folder.glob("*.png")}
     assert drawn
     assert wanted == drawn

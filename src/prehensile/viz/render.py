@@ -83,6 +83,8 @@ def render(
             default_clear_color=np.array(_BACKGROUND), lights=[front, above]
         )
         scene_graph.AddRenderer(scene_context, _RENDERER, MakeRenderEngineVtk(params))
+        # Poses that were computed before are not sent to a new renderer: have them computed anew.
+        context.get_mutable_state()
     core = RenderCameraCore(
         _RENDERER, CameraInfo(width, height, fov_y), ClippingRange(0.01, 20.0), RigidTransform()
     )
