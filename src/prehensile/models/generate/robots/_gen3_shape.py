@@ -15,7 +15,7 @@ from prehensile.models.generate.robots._housing import (
 from prehensile.models.shapes import Material, Part, cylinder, lathe, merge, rounded_box
 from prehensile.models.shapes.implicit import cone, drum, union
 
-SILVER = Material("silver", (0.92, 0.93, 0.94, 1.0), metallic=0.0, roughness=0.4)
+SILVER = Material("silver", (0.78, 0.79, 0.80, 1.0), metallic=0.0, roughness=0.4)
 BLACK = Material("black", (0.06, 0.062, 0.066, 1.0), metallic=0.0, roughness=0.5)
 STEEL = Material("steel", (0.55, 0.56, 0.57, 1.0), metallic=0.2, roughness=0.4)
 

@@ -15,7 +15,7 @@ from prehensile.models.generate.robots._housing import (
 from prehensile.models.shapes import Material, Part, cylinder, lathe, merge
 from prehensile.models.shapes.implicit import cone, drum, rounded_block, union
 
-WHITE = Material("white", (0.97, 0.97, 0.97, 1.0), metallic=0.0, roughness=0.4)
+WHITE = Material("white", (0.84, 0.84, 0.84, 1.0), metallic=0.0, roughness=0.4)
 GREY = Material("grey", (0.26, 0.27, 0.28, 1.0), metallic=0.0, roughness=0.5)
 STEEL = Material("steel", (0.62, 0.63, 0.64, 1.0), metallic=0.2, roughness=0.4)
 

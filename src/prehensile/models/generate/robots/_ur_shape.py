@@ -19,9 +19,9 @@ from prehensile.models.generate.robots._housing import (
 from prehensile.models.shapes import Material, Part, cylinder, lathe, merge
 from prehensile.models.shapes.implicit import Field, drum
 
-LIGHT = Material("light grey", (0.78, 0.79, 0.80, 1.0), metallic=0.0, roughness=0.4)
-GREY = Material("joint grey", (0.40, 0.41, 0.42, 1.0), metallic=0.0, roughness=0.5)
-BLUE = Material("blue", (0.28, 0.55, 0.74, 1.0), metallic=0.0, roughness=0.4)
+LIGHT = Material("light grey", (0.70, 0.71, 0.72, 1.0), metallic=0.0, roughness=0.4)
+GREY = Material("joint grey", (0.30, 0.31, 0.32, 1.0), metallic=0.0, roughness=0.5)
+BLUE = Material("blue", (0.22, 0.47, 0.66, 1.0), metallic=0.0, roughness=0.4)
 
 STEP = 0.0085  # m, edge of the triangles
 AXES = np.eye(3)

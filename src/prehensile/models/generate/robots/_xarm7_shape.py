@@ -15,7 +15,7 @@ from prehensile.models.generate.robots._housing import (
 from prehensile.models.shapes import Material, Mesh, Part, cylinder, lathe, merge
 from prehensile.models.shapes.implicit import Field, cone, drum, rounded_block, slab
 
-WHITE = Material("white", (0.95, 0.95, 0.95, 1.0), metallic=0.0, roughness=0.4)
+WHITE = Material("white", (0.84, 0.84, 0.84, 1.0), metallic=0.0, roughness=0.4)
 STEEL = Material("steel", (0.55, 0.56, 0.57, 1.0), metallic=0.2, roughness=0.4)
 
 STEP = 0.0088  # m, edge of the triangles
