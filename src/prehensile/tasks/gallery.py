@@ -22,7 +22,7 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import Trajectory
 
 from prehensile.control.joint_controller import ControllerKind
-from prehensile.files import write_json
+from prehensile.files import write_atomic, write_json
 from prehensile.station.build import build
 from prehensile.station.guard import GuardStatus
 from prehensile.station.scenario import Scenario
@@ -151,6 +151,7 @@ class Show:
         target: (3,) p_WT of what is in the middle, in m.
         still: names of robots that have nothing to move.
         controller: for the report.
+        text: YAML of the scene if it is none that ships, to be kept beside the report.
         measure: figures by name with unit of the present state, each kept at its greatest.
     """
 
@@ -160,6 +161,7 @@ class Show:
     target: Sequence[float]
     still: Sequence[str] = ()
     controller: str = ""
+    text: str = ""
     measure: Callable[[MultibodyPlant, Context], Mapping[str, float]] | None = None
 
 
@@ -302,9 +304,10 @@ def arms(
         names: of the models wanted; default: all.
     """
     robots = gallery_robots("arm", names)
-    scenario = loads_scenario(scenario_text(robots, controller, "The arms of the gallery."))
+    text = scenario_text(robots, controller, "The arms of the gallery.")
     tracks = [Track(robot.info.name, swing(robot)) for robot in robots]
-    return Show(scenario, tracks, (3.8, 1.6, 2.0), (-0.6, 0.0, 0.4), controller=controller)
+    eye, target = (3.6, -1.2, 1.8), (-0.3, 0.0, 0.35)
+    return Show(loads_scenario(text), tracks, eye, target, controller=controller, text=text)
 
 
 def hands(names: Sequence[str] | None = None) -> Show:
@@ -314,11 +317,11 @@ def hands(names: Sequence[str] | None = None) -> Show:
         names: of the models wanted; default: all.
     """
     robots = gallery_robots("hand", names)
-    scenario = loads_scenario(scenario_text(robots, "stiffness", "The hands of the gallery."))
+    text = scenario_text(robots, "stiffness", "The hands of the gallery.")
     tracks = [Track(robot.info.name, wave(robot)) for robot in robots if robot.joints]
     still = [robot.info.name for robot in robots if not robot.joints]
-    eye = (1.2 + 0.15 * len(robots), 0.3, 0.6)
-    return Show(scenario, tracks, eye, (0.0, 0.0, 0.22), still, controller="stiffness")
+    eye, target = (1.1, 0.0, 0.75), (-0.15, 0.05, 0.3)
+    return Show(loads_scenario(text), tracks, eye, target, still, controller="stiffness", text=text)
 
 
 def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryReport:
@@ -328,7 +331,7 @@ def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryRepor
         show: the demonstration.
         demo: its name.
         browser: open the page, and hold to real time.
-        out: folder of ``report.json`` and ``replay.html``.
+        out: folder of ``report.json``, ``replay.html`` and, unless it ships, ``scenario.yaml``.
     """
     from rich.console import Console
     from rich.table import Table
@@ -351,6 +354,8 @@ def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryRepor
     )
     recorder.save(out / "replay.html")
     write_json(out / "report.json", report.to_json())
+    if show.text:
+        write_atomic(out / "scenario.yaml", show.text)
 
     title = f"{demo}, {report.controller}; errors in mrad, or mm where joints slide"
     table = Table(title=title, title_justify="left")

@@ -13,7 +13,7 @@ from pydrake.math import BsplineBasis, RigidTransform, RollPitchYaw, RotationMat
 from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Body, Joint, ModelInstanceIndex
+from pydrake.multibody.tree import Body, Frame, Joint, ModelInstanceIndex
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from pydrake.solvers import Solve
 from pydrake.systems.framework import Context
@@ -37,7 +37,8 @@ _FRACTION = 0.6  # of what velocity and acceleration limits allow
 _SWING = 0.5  # rad, to either side of the ready posture
 _CLOSED = 0.9  # of the way to the end of a finger's range
 _SPREAD = 0.3  # of the same, for joints that go both ways
-_STARTS = 12  # guesses for a ready posture
+_STARTS = 24  # guesses for a ready posture
+_TWIST = 0.004  # m/rad^2 by which a high elbow is worth less in a twisted posture
 _TILE = 4.0  # m, side of the model of the floor
 
 
@@ -217,17 +218,22 @@ def _base(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Body:
     return next(plant.get_body(i) for i in plant.GetBodyIndices(instance) if i not in carried)
 
 
-def _place_arm(robot: Robot, k: int, count: int) -> Robot:
-    """Arms stand in rows of four and face x, each in its ready posture."""
-    rows = -(-count // 4)
+def _spot(k: int, count: int, in_row: int, apart: tuple[float, float]) -> NDArray[np.float64]:
+    """(2,) place of the k-th of some robots in rows along y, each row between those before it."""
+    rows = -(-count // in_row)
     columns = -(-count // rows)
     row, column = divmod(k, columns)
-    p_WB = [-1.6 * row, 1.2 * (0.5 * (columns - 1) - column), 0.0]
+    return np.array(apart) * [-row, 0.5 * (columns - 1 + row % 2) - column]
+
+
+def _place_arm(robot: Robot, k: int, count: int) -> Robot:
+    """Arms stand in rows and face x, each in its ready posture."""
+    p_WB = [*_spot(k, count, 4, (1.5, 1.1)), 0.0]
     return replace(robot, X_WB=RigidTransform(p_WB), q=_ready(robot))
 
 
 def _place_hand(robot: Robot, k: int, count: int) -> Robot:
-    """Hands stand in a row, fingers up."""
+    """Hands stand in rows, fingers up."""
     plant = robot.plant
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, robot.q)
@@ -235,13 +241,15 @@ def _place_hand(robot: Robot, k: int, count: int) -> Robot:
     tips = [i for i in plant.GetBodyIndices(robot.instance) if i not in carriers]
     p_BTips = np.array([_center(plant, context, plant.get_body(i)) for i in tips])
     p_BTip = p_BTips.mean(axis=0) - _center(plant, context, robot.base)
+    p_BTip[2] += 1e-9  # z is up where nothing says otherwise
     axis = int(np.argmax(np.abs(p_BTip)))
     up = np.sign(p_BTip[axis]) * np.eye(3)[axis]
     # The viewer sees the fingers side by side.
     spread = np.where(np.arange(3) == axis, np.inf, np.ptp(p_BTips, axis=0))
     front = np.eye(3)[int(np.argmin(spread))]
     R_BW = np.column_stack([front, np.cross(up, front), up])
-    p_WB = [0.0, 0.36 * (0.5 * (count - 1) - k), 0.15]
+    x, y = _spot(k, count, 3, (0.3, 0.38))
+    p_WB = [x, y, 0.1 - x]  # as if on steps: nobody hides who stands behind
     return replace(robot, X_WB=RigidTransform(RotationMatrix(R_BW).inverse(), p_WB))
 
 
@@ -257,19 +265,17 @@ def _ready(robot: Robot) -> NDArray[np.float64]:
     context = plant.CreateDefaultContext()
     origins = [joint.frame_on_child().CalcPoseInWorld(context).translation() for joint in chain]
     reach = float(np.linalg.norm(np.diff(origins, axis=0), axis=1).sum())
-    flange = chain[-1].child_body()
+    flange = _flange(robot)
     rng = np.random.default_rng(0)
-    best, best_height = robot.q, -np.inf
+    best, best_score = robot.q, -np.inf
     lower, upper = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
     lower, upper = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
     p_WF = origins[0] * [0.0, 0.0, 1.0] + reach * np.array([0.6, 0.0, 0.25])
     for _ in range(_STARTS):
         ik = InverseKinematics(plant)
-        ik.AddPositionConstraint(
-            flange.body_frame(), np.zeros(3), plant.world_frame(), p_WF - 0.02, p_WF + 0.02
-        )
+        ik.AddPositionConstraint(flange, np.zeros(3), plant.world_frame(), p_WF - 0.02, p_WF + 0.02)
         ik.AddAngleBetweenVectorsConstraint(
-            flange.body_frame(), [0.0, 0.0, 1.0], plant.world_frame(), [0.0, 0.0, -1.0], 0.0, 0.1
+            flange, [0.0, 0.0, 1.0], plant.world_frame(), [0.0, 0.0, -1.0], 0.0, 0.1
         )
         guess = rng.uniform(lower, upper)
         prog, q = ik.prog(), ik.q()
@@ -281,10 +287,20 @@ def _ready(robot: Robot) -> NDArray[np.float64]:
         found = result.GetSolution(q)
         plant.SetPositions(context, found)
         bodies = [plant.get_body(i) for i in plant.GetBodyIndices(robot.instance)]
-        height = float(np.mean([_center(plant, context, body)[2] for body in bodies]))
-        if height > best_height and _free(robot, found[None, robot.index]):
-            best, best_height = found, height
+        height = np.mean([_center(plant, context, body)[2] for body in bodies])
+        score = float(height - _TWIST * np.sum((found - robot.q) ** 2))
+        if score > best_score and _free(robot, found[None, robot.index]):
+            best, best_score = found, score
     return best
+
+
+def _flange(robot: Robot) -> Frame:
+    """The frame that a model names on its last link, z out of it; else that link's own."""
+    plant, last = robot.plant, robot.joints[-1].child_body()
+    welded = {body.index() for body in plant.GetBodiesWeldedTo(last)}
+    frames = [plant.get_frame(i) for i in plant.GetFrameIndices(robot.instance)]
+    named = [f for f in frames if f.body().index() in welded and f.name() != last.name()]
+    return named[-1] if named else last.body_frame()
 
 
 def _joint_limits(robot: Robot) -> JointLimits:
