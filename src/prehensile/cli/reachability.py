@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--axis", nargs=3, type=float, default=(0.0, 0.0, 1.0), metavar=("X", "Y", "Z"),
         help="its approach axis (default: 0 0 1)",
     )  # fmt: skip
-    making.add_argument("--samples", type=float, default=1e6, metavar="N", help="default: 1e6")
+    making.add_argument("--samples", type=float, default=1e7, metavar="N", help="default: 1e7")
     making.add_argument(
         "--voxel", type=float, default=0.05, metavar="M", help="edge of a voxel (default: 0.05 m)"
     )
