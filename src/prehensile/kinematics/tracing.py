@@ -301,7 +301,7 @@ def _unsolved(tree: PlantTree, q: Array, posture: Posture, s: float, error: floa
     held = (q <= posture.lower) | (q >= posture.upper)
     names = [name for name, out in zip(tree.joints, held, strict=True) if out]
     if names:
-        reason = f"the path needs more of {', '.join(names)} than the limits allow"
+        reason = f"from here it needs more of {', '.join(names)} than the limits allow"
         return TracedPath("limits", None, reason, float(s))
-    reason = f"the path leaves the workspace by {1e3 * error:.1f} mm or mrad"
+    reason = f"the path leaves the workspace ({1e3 * error:.2g} mm or mrad short)"
     return TracedPath("unreachable", None, reason, float(s))

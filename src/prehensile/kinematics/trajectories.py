@@ -11,9 +11,11 @@ overlaps, the corner between them is rounded, in position and rotation alike (cu
 Kim, Kim, Shin, SIGGRAPH 1995). Derivatives are exact for any progress.
 
 Drake's ``PiecewisePose`` is the special case of a linear progress without overlap (or cubic
-positions); a ``PathParameterizedTrajectory`` around it cannot be differentiated, as of Drake 1.51.
+positions). A ``PathParameterizedTrajectory`` around it would give it any timing law, but returns
+a 4x4 matrix with unset entries when it is differentiated (Drake 1.51).
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal, NamedTuple, get_args
@@ -80,7 +82,8 @@ class PoseTrajectory:
             raise ValueError(f"progress must have {len(poses) - 1} entries, got {len(progress)}")
         self.poses = tuple(poses)
         self.progress = tuple(progress)
-        self._rates = [(b.derivative(1), b.derivative(2)) for b in progress]
+        # As plain numbers: a call of PPoly takes longer than everything else in state().
+        self._pieces = [(b.x.tolist(), b.c.T.tolist()) for b in progress]
         self._spans = [(float(b.x[0]), float(b.x[-1])) for b in progress]
         self._p = np.array([X.translation() for X in poses])
         self._R = [X.rotation().matrix() for X in poses]
@@ -102,8 +105,7 @@ class PoseTrajectory:
             if t <= start:
                 break
             if t < end:
-                rate, bend = self._rates[i]
-                beta, beta_1, beta_2 = float(self.progress[i](t)), float(rate(t)), float(bend(t))
+                beta, beta_1, beta_2 = _evaluate(*self._pieces[i], t)
             else:
                 beta, beta_1, beta_2 = 1.0, 0.0, 0.0
             p += beta * self._d[i]
@@ -247,6 +249,20 @@ def _ramp_progress(start: float, end: float, rise: float, fall: float, blend: Bl
     keep = np.diff(breaks) > 1e-12 * T
     knots = [b for b, k in zip(breaks, keep, strict=False) if k] + [breaks[-1]]
     return PPoly(c[::-1, keep], knots)
+
+
+def _evaluate(
+    breaks: list[float], coefficients: list[list[float]], t: float
+) -> tuple[float, float, float]:
+    """A piecewise polynomial and its first two derivatives (Horner's scheme)."""
+    piece = min(max(bisect_right(breaks, t) - 1, 0), len(coefficients) - 1)
+    x = t - breaks[piece]
+    value = slope = bend = 0.0
+    for c in coefficients[piece]:
+        bend = bend * x + 2.0 * slope
+        slope = slope * x + value
+        value = value * x + c
+    return value, slope, bend
 
 
 def _cross(a: Array, b: Array) -> Array:
