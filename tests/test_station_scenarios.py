@@ -61,18 +61,20 @@ def test_nothing_but_what_is_mounted_touches_at_the_start(name):
         for contact in query.ComputePointPairPenetration()
         if contact.depth > 1e-4
     }
-    moving = {m for pair in pairs for m in pair if m.startswith(("iiwa", "wsg"))}
+    moving = {m for pair in pairs for m in pair if m.startswith(("iiwa", "wsg", "allegro"))}
     assert not moving, pairs
 
 
 @pytest.mark.parametrize("name", list_scenarios())
 def test_hands_point_down_at_the_start(name):
     plant = plant_of(name)
-    hands = [h for h in ("wsg", "wsg_left", "wsg_right") if plant.HasModelInstanceNamed(h)]
+    fingers = {"wsg": 1, "wsg_left": 1, "wsg_right": 1, "allegro": 2}  # axis along them
+    hands = [hand for hand in fingers if plant.HasModelInstanceNamed(hand)]
     assert hands
     for hand in hands:
-        y_axis = pose(plant, hand, "body").rotation().matrix()[:, 1]
-        np.testing.assert_allclose(y_axis, [0, 0, -1], atol=1e-3)
+        body = "hand_root" if hand == "allegro" else "body"
+        axis = pose(plant, hand, body).rotation().matrix()[:, fingers[hand]]
+        np.testing.assert_allclose(axis, [0, 0, -1], atol=1e-3)
 
 
 def test_the_planar_station_moves_in_the_plane_y_0_and_closes_in_it():
