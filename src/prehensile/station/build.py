@@ -99,7 +99,8 @@ def _export_cheat_ports(
         ("applied_spatial_force", plant.get_applied_spatial_force_input_port()),
         ("applied_generalized_force", plant.get_applied_generalized_force_input_port()),
     ):
-        builder.ExportInput(port, f"cheat.{name}")
+        if not builder.IsConnectedOrExported(port):  # a driver may hand on what comes in
+            builder.ExportInput(port, f"cheat.{name}")
     for name, port in (
         ("plant_state", plant.get_state_output_port()),
         ("body_poses", plant.get_body_poses_output_port()),

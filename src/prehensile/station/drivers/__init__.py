@@ -15,7 +15,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from prehensile.errors import Finding, InputError
-from prehensile.station.drivers import iiwa, joint_control, wsg, zero_force
+from prehensile.station.drivers import iiwa, joint_control, suction, wsg, zero_force
 from prehensile.station.drivers.site import Driver, Site
 
 __all__ = ["Driver", "Site", "driver_of", "driver_types", "drivers"]
@@ -37,6 +37,7 @@ def drivers() -> dict[str, Driver]:
         joint_control.INVERSE_DYNAMICS,
         joint_control.JOINT_STIFFNESS,
         joint_control.JOINT_PID,
+        suction.DRIVER,
         zero_force.DRIVER,
     )
     found = {driver.tag: driver for driver in own}

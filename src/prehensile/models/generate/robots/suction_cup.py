@@ -42,7 +42,7 @@ LIP_Z = 0.115  # m
 
 METAL = Contact(mu=0.4, relaxation_time=0.02)
 RUBBER = Contact(
-    mu=1.0, hydroelastic="compliant", modulus=1e6, resolution=0.01, relaxation_time=0.01
+    mu=1.0, hydroelastic="compliant", modulus=1e6, resolution=0.02, relaxation_time=0.01
 )
 
 ALUMINIUM = Material("aluminium", (0.62, 0.63, 0.65, 1.0), roughness=0.45)
