@@ -32,6 +32,8 @@ namespace internal {
 inline constexpr double kSingular = 1e-11;
 /// A target that is out of reach by no more than this (m) is taken as on the boundary.
 inline constexpr double kReach = 1e-10;
+/// Squares of sines below this are rounding.
+inline constexpr double kRounding = 2e-14;
 
 inline Turn TurnBy(double angle) { return {std::cos(angle), std::sin(angle)}; }
 inline Turn operator+(const Turn& a, const Turn& b) {
@@ -39,6 +41,10 @@ inline Turn operator+(const Turn& a, const Turn& b) {
 }
 inline Turn operator-(const Turn& a) { return {a.c, -a.s}; }
 inline Turn operator-(const Turn& a, const Turn& b) { return a + -b; }
+inline Turn Normalized(const Turn& a) {
+  const double length = std::sqrt(a.c * a.c + a.s * a.s);
+  return {a.c / length, a.s / length};
+}
 inline Turn Opposite(const Turn& a) { return {-a.c, -a.s}; }
 
 /// Z = Rz(first) Ry(middle) Rz(last) with the sine of the middle angle >= 0. The other solution has

@@ -62,10 +62,24 @@ namespace internal {
 IkStatus PlanarElbow::Bend(double distance, Turn* bend) const {
   if (distance > upper + fore + kReach) return IkStatus::kTooFar;
   if (distance < std::abs(upper - fore) - kReach) return IkStatus::kTooNear;
-  const double c = (distance * distance - upper * upper - fore * fore) / (2 * upper * fore);
-  bend->c = std::clamp(c, -1.0, 1.0);
-  bend->s = std::sqrt((1 - bend->c) * (1 + bend->c));
+  // By half the angle, which is exact to rounding at the stretched and the folded elbow, too.
+  const double scale = 0.25 / (upper * fore), sum = upper + fore, difference = upper - fore;
+  double c2 = (distance - difference) * (distance + difference) * scale;
+  double s2 = (sum - distance) * (sum + distance) * scale;
+  // Rounding of the pose must not bend a stretched elbow by its square root.
+  if (c2 < kRounding) c2 = 0;
+  if (s2 < kRounding) s2 = 0;
+  bend->c = std::clamp(c2 - s2, -1.0, 1.0);
+  bend->s = 2 * std::sqrt(c2 * s2);
   return IkStatus::kSolved;
+}
+
+Turn PlanarElbow::UpperAngle(double square, const Turn& bend) const {
+  return {(square + (upper - fore) * (upper + fore)) / (2 * upper), fore * bend.s};
+}
+
+Turn PlanarElbow::ForeAngle(double square, const Turn& bend) const {
+  return {(square - (upper - fore) * (upper + fore)) / (2 * fore), upper * bend.s};
 }
 
 ParallelShoulder MakeParallelShoulder(const ArmLines& lines, const Vector3d& wrist,
@@ -99,16 +113,18 @@ IkStatus ParallelShoulder::Base(const Vector3d& P, double q1_free, Turn turns[2]
   const Vector3d v = B.transpose() * (P - point);
   const double square = v.x() * v.x() + v.z() * v.z();
   const double distance = std::sqrt(square);
-  *count = 2;
+  *count = 0;
   double ahead = 0;
   if (distance < kReach && std::abs(side) < kReach) {
     // P is on axis 1 and may be there with any turn.
     turns[0] = TurnBy(q1_free);
     turns[1] = Opposite(turns[0]);
+    *count = 2;
   } else {
     if (distance < std::abs(side) - kReach) return IkStatus::kTooNear;
-    ahead = std::sqrt(std::max(0.0, (distance - std::abs(side)) * (distance + std::abs(side))));
-    if (ahead == 0) *count = 1;
+    const double ahead2 = (distance - std::abs(side)) * (distance + std::abs(side));
+    ahead = ahead2 < kRounding * square ? 0 : std::sqrt(ahead2);
+    *count = ahead == 0 ? 1 : 2;
     for (int k = 0; k < *count; ++k) {
       const double x = k == 0 ? ahead : -ahead;
       const double c = v.z() * side + v.x() * x, s = v.x() * side - v.z() * x;
@@ -124,7 +140,7 @@ IkStatus ParallelShoulder::Base(const Vector3d& P, double q1_free, Turn turns[2]
 Turn ParallelShoulder::Upper(double x, double y, const Turn& bend, double free_angle) const {
   const double square = x * x + y * y;
   if (square < kReach * kReach) return TurnBy(free_angle);
-  const double along = elbow.upper + elbow.fore * bend.c, across = elbow.fore * bend.s;
+  const auto [along, across] = elbow.UpperAngle(square, bend);
   const Turn turn{along * x + across * y, along * y - across * x};
   const double length = std::sqrt(turn.c * turn.c + turn.s * turn.s);
   return {turn.c / length, turn.s / length};
@@ -192,13 +208,13 @@ void UrArm::Solve(const double* X_WG, const IkOptions& options, IkSolutions* out
                                  ? shoulder_.elbow.upper + shoulder_.elbow.fore
                                  : std::abs(shoulder_.elbow.upper - shoulder_.elbow.fore);
         const double distance = std::hypot(x, y);
-        const double c = (distance * distance + wrist_length_ * wrist_length_ - reach * reach) /
-                         (2 * distance * wrist_length_);
-        if (std::abs(c) <= 1) {
+        if (distance > internal::kReach) {
+          const double c = (distance * distance + wrist_length_ * wrist_length_ - reach * reach) /
+                           (2 * distance * wrist_length_);
           const double middle = std::atan2(y, x) - std::atan2(wrist_y_, wrist_x_);
           const double now = std::atan2(first.s, first.c);
           const double side = std::sin(now - middle) < 0 ? -1 : 1;
-          first = internal::TurnBy(middle + side * std::acos(c));
+          first = internal::TurnBy(middle + side * std::acos(std::clamp(c, -1.0, 1.0)));
           last = internal::LastFromFirst(Z, first);
           end = fore_end();
           status = shoulder_.elbow.Bend(end.norm(), &bend);

@@ -149,8 +149,10 @@ void SrsArm::Reference(const Vector3d& d, Matrix3d* D0) const {
     x = F1_.col(0) - d * d.dot(F1_.col(0));
     length = x.norm();
   }
+  x /= length;
+  x -= d * d.dot(x);  // Once more, for the digits that were lost where x was short.
   D0->col(0) = d;
-  D0->col(1) = x / length;
+  D0->col(1) = x.normalized();
   D0->col(2) = d.cross(D0->col(1));
 }
 
@@ -165,11 +167,8 @@ IkStatus SrsArm::Prepare(const double* X_WG, Target* target) const {
   const internal::PlanarElbow elbow{upper_length_, fore_length_};
   const IkStatus status = elbow.Bend(D, &target->bend);
   if (status != IkStatus::kSolved) return status;
-  const auto& [c, s] = target->bend;
-  const double along = upper_length_ + fore_length_ * c;
-  const double D_exact = std::sqrt(along * along + fore_length_ * s * fore_length_ * s);
-  target->at_shoulder = {along / D_exact, fore_length_ * s / D_exact};
-  target->at_wrist = {(fore_length_ + upper_length_ * c) / D_exact, upper_length_ * s / D_exact};
+  target->at_shoulder = internal::Normalized(elbow.UpperAngle(D * D, target->bend));
+  target->at_wrist = internal::Normalized(elbow.ForeAngle(D * D, target->bend));
   Reference(v / D, &target->D0);
   target->R_7 = R * R_GF7_;
   return IkStatus::kSolved;

@@ -196,6 +196,10 @@ struct PlanarElbow {
   double upper, fore;  // Lengths.
   /// Cosine and sine >= 0 of the angle between the links when they span a distance.
   IkStatus Bend(double distance, Turn* bend) const;
+  /// Angles, not normalized, of upper arm and forearm with the line from end to end, whose length's
+  /// square is given.
+  Turn UpperAngle(double square, const Turn& bend) const;
+  Turn ForeAngle(double square, const Turn& bend) const;
 };
 
 /// Joint 1 perpendicular to the parallel joints 2 and 3: the first three of most 6-joint arms.
