@@ -75,9 +75,9 @@ def render(
     scene_context = scene_graph.GetMyMutableContextFromRoot(context)
     if not scene_graph.HasRenderer(scene_context, _RENDERER):
         # One light where the camera is, and one from above, so that tops and sides differ.
-        front = LightParameter(type="directional", intensity=0.75)
+        front = LightParameter(type="directional", intensity=1.5)
         above = LightParameter(
-            type="directional", frame="world", direction=[0.3, 0.2, -1.0], intensity=0.75
+            type="directional", frame="world", direction=[0.3, 0.2, -1.0], intensity=1.0
         )
         params = RenderEngineVtkParams(
             default_clear_color=np.array(_BACKGROUND), lights=[front, above]
