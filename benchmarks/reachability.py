@@ -59,7 +59,7 @@ def ours(folder: Path) -> Results:
     return {
         POSES: _rate(len(Q), time_calls(lambda: tree.poses(Q), repeats=5)),
         JACOBIANS: _rate(len(Q), time_calls(lambda: tree.jacobians(Q), repeats=5)),
-        CALL: Samples([s / _LOOP for s in calls], "s"),
+        CALL: Samples([1e6 * s / _LOOP for s in calls], "µs"),
         MAP: _rate(_SAMPLES, time_calls(lambda: reachability_map(compiled, config), repeats=2)),
     }
 
@@ -116,7 +116,7 @@ def drake(folder: Path) -> Results:
     return {
         POSES: _rate(_LOOP, each(pose)),
         JACOBIANS: _rate(_LOOP, each(jacobian)),
-        CALL: Samples([s / _LOOP for s in each(both)], "s"),
+        CALL: Samples([1e6 * s / _LOOP for s in each(both)], "µs"),
         MAP: _rate(_LOOP, time_calls(make_map, repeats=5)),
     }
 
