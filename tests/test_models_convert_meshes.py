@@ -2,6 +2,7 @@
 
 import json
 import struct
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -45,10 +46,10 @@ def test_a_cylinder_and_a_ball_come_close_to_the_closed_forms(tmp_path):
     across = 2 * (3 * 0.05**2 + 0.4**2) / 12
     expected = np.diag([across, across, 2 * 0.05**2 / 2])
     np.testing.assert_allclose(central(model), expected, rtol=1e-3, atol=1e-9)
-    points, faces = ball(0.1, 60)
+    points, faces = ball(0.1, 30)
     model = load(write_stl(tmp_path / "ball.stl", points, faces), tmp_path / "ball")
     volume = 4 / 3 * np.pi * 0.1**3
-    assert model.inertia("base_link").get_mass() == pytest.approx(1000 * volume, rel=5e-3)
+    assert model.inertia("base_link").get_mass() == pytest.approx(1000 * volume, rel=2e-2)
     mass = model.inertia("base_link").get_mass()
     np.testing.assert_allclose(
         central(model), 0.4 * mass * 0.1**2 * np.eye(3), rtol=5e-3, atol=1e-8
@@ -101,7 +102,9 @@ def two_blocks():
     return np.vstack([a, b, bridge]), faces
 
 
-@pytest.mark.parametrize("choice", ["hull", "box", "keep", "decompose"])
+@pytest.mark.parametrize(
+    "choice", ["hull", "box", "keep", pytest.param("decompose", marks=pytest.mark.slow)]
+)
 def test_what_stands_for_a_collision_mesh(tmp_path, choice):
     if choice == "decompose":
         pytest.importorskip("coacd")
@@ -109,7 +112,7 @@ def test_what_stands_for_a_collision_mesh(tmp_path, choice):
     model = load(mesh, tmp_path / "out", collision=choice)
     shapes = [model.inspector.GetShape(g) for g in model.shapes("base_link")]
     kinds = {type(s).__name__ for s in shapes}
-    low, high = model.extents("base_link")
+    _, high = model.extents("base_link")
     np.testing.assert_allclose(high, [0.25, 0.05, 0.05], atol=0.01)
     # Above the bridge there is nothing, but inside of the hull.
     query = model.plant.get_geometry_query_input_port().Eval(model.context)
@@ -192,6 +195,7 @@ def test_a_mirrored_mesh_of_a_robot_is_mirrored_with_its_faces(tmp_path):
 
 
 def gltf_with(**changes):
+    data = "data:application/octet-stream;base64," + "AAAA" * 12
     document = {
         "asset": {"version": "2.0"},
         "scenes": [{"nodes": [0]}],
@@ -199,18 +203,14 @@ def gltf_with(**changes):
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3", "bufferView": 0}],
         "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "buffers": [
-            {"byteLength": 36, "uri": "data:application/octet-stream;base64," + "AAAA" * 12}
-        ],
+        "buffers": [{"byteLength": 36, "uri": data}],
     }
     return json.dumps(document | changes).encode()
 
 
 BOMB = (
     b'<?xml version="1.0"?><!DOCTYPE c [<!ENTITY a "aaaaaaaaaa">'
-    + b"".join(
-        f'<!ENTITY {b} "&{a};&{a};&{a};&{a};">'.encode() for a, b in zip("abcdefgh", "bcdefghi")
-    )
+    + b"".join(f'<!ENTITY {b} "&{a};&{a};&{a};&{a};">'.encode() for a, b in pairwise("abcdefghi"))
     + b"]><COLLADA>&i;</COLLADA>"
 )
 UTF16 = BOMB.replace(b'version="1.0"', b'version="1.0" encoding="utf-16"').decode().encode("utf-16")
@@ -229,7 +229,8 @@ UTF16 = BOMB.replace(b'version="1.0"', b'version="1.0" encoding="utf-16"').decod
         ("huge.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\n"
          b"property float x\nproperty float y\nproperty float z\nend_header\n"),
         ("huge.off", b"OFF\n99999999999 1 0\n0 0 0\n"),
-        ("huge.gltf", gltf_with(accessors=[{"componentType": 5126, "count": 10**12, "type": "VEC3"}])),
+        ("huge.gltf",
+         gltf_with(accessors=[{"count": 10**12, "type": "VEC3", "componentType": 5126}])),
         ("out.gltf", gltf_with(buffers=[{"byteLength": 36, "uri": "../secret.bin"}])),
         ("not.gltf", b"{"),
         ("not.glb", b"glTF"),
