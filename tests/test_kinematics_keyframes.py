@@ -11,6 +11,7 @@ from prehensile.kinematics.keyframes import (
     Keyframe,
     TimingConfig,
     keyframe_motion,
+    pick_and_place_keyframes,
     time_keyframes,
 )
 from prehensile.kinematics.poses import pose_distance
@@ -151,6 +152,38 @@ def test_forth_and_back_many_times_without_drift(tree):
     returned = time_keyframes(tree, 0, q, back, q_nominal=Q_HOME)
     assert returned.found, returned.reason
     np.testing.assert_allclose(returned.q_end, Q_HOME, atol=1e-7)
+
+
+@pytest.mark.parametrize("yaw", [-2.8, -2.0, -0.7, 0.4, 1.5])
+def test_pick_and_place_at_any_yaw(tree, yaw):
+    X_WGinitial = RigidTransform(tree.tree.pose(Q_HOME, 0))
+    X_WO = RigidTransform(RotationMatrix.MakeZRotation(yaw), [0.5, 0.2, 0.03])
+    X_WOd = RigidTransform(RotationMatrix.MakeZRotation(0.0), [0.5, -0.25, 0.03])
+    # A brick can be taken either way round, and joint 7 has not room for both.
+    motions = []
+    for flip in (0.0, np.pi):
+        X_OGrasp = X_OG @ RigidTransform(RotationMatrix.MakeYRotation(flip))
+        keyframes = pick_and_place_keyframes(
+            X_WGinitial, X_WO @ X_OGrasp, X_WOd @ X_OGrasp, clearance=0.45
+        )
+        poses = {k.name: k.X_WG for k in keyframes}
+        # Before the grasp the hand is 10 cm above it, and over the table it is high enough.
+        up = poses["prepick"].translation() - poses["pick"].translation()
+        np.testing.assert_allclose(up, [0, 0, 0.1], atol=1e-12)
+        assert poses["clearance"].translation()[2] == pytest.approx(0.45)
+        turn = pose_distance(poses["prepick"], poses["clearance"])[1]
+        assert turn == pytest.approx(pose_distance(poses["clearance"], poses["preplace"])[1])
+        motion = time_keyframes(tree, 0, Q_HOME, keyframes)
+        if motion.found:
+            motions.append(motion)
+            for name in ("pick", "place"):
+                q = motion.joints.value(motion.arrivals[name]).ravel()
+                X_WG = RigidTransform(tree.tree.pose(q, 0))
+                assert max(pose_distance(X_WG, poses[name])) < 1e-6
+        else:
+            assert "iiwa_joint_7" in motion.reason
+    assert min(motion.duration for motion in motions) < 6.0
+    assert list(motions[0].arrivals)[:3] == ["initial", "prepick", "pick"]
 
 
 def test_unreachable_keyframes_are_named(tree):

@@ -141,7 +141,9 @@ def test_start_elsewhere_is_refused(tree):
 
 def test_jumps_of_the_pose_are_refused(tree):
     X_WA, X_WB = pose_at(tree, Q_HOME), down(0.5, 0.2, 0.3)
-    traced = trace_path(tree, 0, lambda s: X_WA if s < 0.5 else X_WB, 0, 1, Q_HOME)
+    config = TracingConfig(max_refinements=1)
+    pose = lambda s: X_WA if s < 0.5 else X_WB  # noqa: E731
+    traced = trace_path(tree, 0, pose, 0, 1, Q_HOME, config=config)
     assert traced.status == "jump"
     assert traced.at == pytest.approx(0.5, abs=0.1)
 

@@ -4,13 +4,12 @@
         Keyframe("initial", X_WGinitial, width=0.1),
         Keyframe("prepick", X_WGprepick),
         Keyframe("pick", X_WGpick, width=0.0, dwell=0.5),
-        Keyframe("lift", X_WGprepick),
-        Keyframe("clearance", X_WGclearance, blend=0.1),
-        Keyframe("preplace", X_WGpreplace),
-        Keyframe("place", X_WGplace, width=0.1, dwell=0.5),
-        Keyframe("retreat", X_WGpreplace),
+        Keyframe("lift", X_WGprepick, blend=0.05),
+        ...
     ]
     motion = time_keyframes(tree, 0, q_start, keyframes)
+
+The whole of that sequence is :func:`pick_and_place_keyframes`.
 
 A motion holds the pose of the hand, its opening and, if an arm is to carry it, the joint positions
 as functions of time.
@@ -116,9 +115,62 @@ class KeyframeMotion:
         return self.status == "found"
 
     @property
+    def arrivals(self) -> dict[str, float]:
+        """When each keyframe is reached, by name, in s."""
+        return dict(zip(self.names, map(float, self.times), strict=False))
+
+    @property
     def duration(self) -> float:
         """How long it lasts, in s, the last dwell included."""
         return self.poses.end_time if self.poses is not None else 0.0
+
+
+def pick_and_place_keyframes(
+    X_WGinitial: RigidTransform,
+    X_WGpick: RigidTransform,
+    X_WGplace: RigidTransform,
+    *,
+    p_GPre: ArrayLike = (0.0, -0.1, 0.0),
+    clearance: float = 0.4,
+    open_width: float = 0.1,
+    closed_width: float = 0.0,
+    dwell: float = 0.5,
+    blend: float = 0.05,
+) -> list[Keyframe]:
+    """The keyframes of picking something up here and setting it down there.
+
+    They are initial, prepick, pick, lift, clearance, preplace, place, retreat: down from the
+    prepick pose in a straight line and up again, over the table, and the same at the goal (Tedrake,
+    *Robotic Manipulation*, section 3.8).
+
+    Args:
+        X_WGinitial: where the hand is.
+        X_WGpick: the hand at the object.
+        X_WGplace: the hand at the object when it is to let go.
+        p_GPre: (3,) where the hand waits before the grasp and the release, seen from there, in m;
+            the default suits a hand whose y points to its finger tips.
+        clearance: least height of the hand's origin in W, in m, half-way from lift to preplace,
+            where the orientation is half-way as well.
+        open_width, closed_width: openings of the hand, in m.
+        dwell: time for the fingers to close or open, in s.
+        blend: how far from lift, clearance and preplace the hand may pass, in m; 0 stops there.
+    """
+    X_GPre = RigidTransform(np.asarray(p_GPre, float))
+    X_WGprepick, X_WGpreplace = X_WGpick @ X_GPre, X_WGplace @ X_GPre
+    poses = [X_WGprepick, X_WGpreplace]
+    middle = PoseTrajectory(poses, [law_progress(0.0, 1.0, "linear")]).value(0.5)
+    p = middle.translation()
+    X_WGclearance = RigidTransform(middle.rotation(), [p[0], p[1], max(p[2], clearance)])
+    return [
+        Keyframe("initial", X_WGinitial, width=open_width),
+        Keyframe("prepick", X_WGprepick),
+        Keyframe("pick", X_WGpick, width=closed_width, dwell=dwell),
+        Keyframe("lift", X_WGprepick, blend=blend),
+        Keyframe("clearance", X_WGclearance, blend=blend),
+        Keyframe("preplace", X_WGpreplace, blend=blend),
+        Keyframe("place", X_WGplace, width=open_width, dwell=dwell),
+        Keyframe("retreat", X_WGpreplace),
+    ]
 
 
 def keyframe_motion(
