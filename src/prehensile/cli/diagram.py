@@ -1,4 +1,4 @@
-"""``prehensile diagram``: draw the system diagram of a station."""
+"""``prehensile diagram``: draw the system diagram of a station, or its kinematic tree."""
 
 import argparse
 
