@@ -306,7 +306,7 @@ def arms(
     robots = gallery_robots("arm", names)
     text = scenario_text(robots, controller, "The arms of the gallery.")
     tracks = [Track(robot.info.name, swing(robot)) for robot in robots]
-    eye, target = (3.6, -1.2, 1.8), (-0.3, 0.0, 0.35)
+    eye, target = (2.3, -0.9, 1.4), (-0.3, 0.0, 0.35)
     return Show(loads_scenario(text), tracks, eye, target, controller=controller, text=text)
 
 
@@ -320,7 +320,7 @@ def hands(names: Sequence[str] | None = None) -> Show:
     text = scenario_text(robots, "stiffness", "The hands of the gallery.")
     tracks = [Track(robot.info.name, wave(robot)) for robot in robots if robot.joints]
     still = [robot.info.name for robot in robots if not robot.joints]
-    eye, target = (1.1, 0.0, 0.75), (-0.15, 0.05, 0.3)
+    eye, target = (0.7, 0.0, 0.6), (-0.2, 0.05, 0.27)
     return Show(loads_scenario(text), tracks, eye, target, still, controller="stiffness", text=text)
 
 

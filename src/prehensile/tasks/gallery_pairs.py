@@ -97,7 +97,7 @@ def bimanual() -> Show:
         ),
     ]
     return Show(
-        scenario, tracks, (1.7, -0.9, 1.1), (-0.05, 0.0, 0.3), controller="IiwaDriver",
+        scenario, tracks, (1.0, -0.6, 0.75), (0.05, 0.0, 0.25), controller="IiwaDriver",
         measure=_lifted,
     )  # fmt: skip
 
@@ -133,8 +133,8 @@ def iiwa_allegro() -> Show:
     return Show(
         scenario,
         [Track("iiwa", _held(samples)), Track("allegro", _grasps(duration))],
-        (1.5, 0.7, 0.9),
-        (0.3, 0.0, 0.3),
+        (1.05, 0.5, 0.7),
+        (0.35, 0.0, 0.33),
         controller="IiwaDriver and JointStiffnessDriver",
     )
 
