@@ -17,7 +17,7 @@ from prehensile.errors import InputError
 
 # name: (module in prehensile.cli, one line of help)
 COMMANDS: dict[str, tuple[str, str]] = {
-    "demo": ("demo", "run a demonstration: clear-bin, pick-place"),
+    "demo": ("demo", "run a demonstration, from clear-bin to arms, hands, bimanual"),
     "run": ("run", "simulate a scenario and watch it in the browser"),
     "view": ("view", "look at a model or a scenario, with joint sliders"),
     "teleop": ("teleop", "drive a station's arm and hand from the browser"),
