@@ -131,6 +131,24 @@ def test_the_geared_pendulum_is_linear_and_rests_where_it_is_told():
     assert sags[1] < sags[0] / 6.0
 
 
+def test_one_set_of_gains_does_for_a_geared_joint_whatever_it_carries():
+    """Gains made for 1 kg, then 3 kg: the direct drive swings, the geared one hardly notices."""
+    overshoots = []
+    for gear_ratio in (1.0, 160.0):
+        light = GearedPendulum(gear_ratio=gear_ratio, damping=0.0, gravity=0.0)
+        heavy = dc.replace(light, mass=3.0)
+        gains = position_control(light, 10.0)
+        motion = simulate_pendulum(heavy, gains, 1.0)
+        overshoots.append(motion.q.max() - 1.0)
+        # Second order: damping ratio sqrt(I_light / I_heavy) of what was critical.
+        zeta = np.sqrt(light.inertia / heavy.inertia)
+        # With no rate in the command kd acts as damping alone: the classical overshoot.
+        wanted = np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2))
+        assert overshoots[-1] == pytest.approx(wanted, abs=2e-3)
+    assert overshoots[0] > 0.1
+    assert overshoots[1] < 0.01
+
+
 def test_an_integral_takes_the_sag_away():
     gains = gains_for_bandwidth(DIRECT.inertia, 10.0, integral_rate=5.0)
     motion = simulate_pendulum(DIRECT, gains, lambda t: 1.0, duration=4.0)
