@@ -262,8 +262,7 @@ def generate(folder: Path) -> None:
         ),
         sources=[
             "Robotiq, 2F-85 and 2F-140 instruction manual: stroke, force, speed, length",
-            "robotiq_description: hinges and mass properties; the model of MuJoCo Menagerie: "
-            "which link has the spring, size of the pads",
+            "robotiq_description: hinges and mass properties; MuJoCo Menagerie: size of the pads",
             "Inertia of the drive, friction and spring are estimates",
         ],
     )
