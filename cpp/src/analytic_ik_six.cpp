@@ -63,7 +63,7 @@ IkStatus PlanarElbow::Bend(double distance, Turn* bend) const {
   if (distance > upper + fore + kReach) return IkStatus::kTooFar;
   if (distance < std::abs(upper - fore) - kReach) return IkStatus::kTooNear;
   // By half the angle, which is exact to rounding at the stretched and the folded elbow, too.
-  const double scale = 0.25 / (upper * fore), sum = upper + fore, difference = upper - fore;
+  const double sum = upper + fore, difference = upper - fore;
   double c2 = (distance - difference) * (distance + difference) * scale;
   double s2 = (sum - distance) * (sum + distance) * scale;
   // Rounding of the pose must not bend a stretched elbow by its square root.
@@ -75,11 +75,11 @@ IkStatus PlanarElbow::Bend(double distance, Turn* bend) const {
 }
 
 Turn PlanarElbow::UpperAngle(double square, const Turn& bend) const {
-  return {(square + (upper - fore) * (upper + fore)) / (2 * upper), fore * bend.s};
+  return {(square + (upper - fore) * (upper + fore)) * half_inverse_upper, fore * bend.s};
 }
 
 Turn PlanarElbow::ForeAngle(double square, const Turn& bend) const {
-  return {(square - (upper - fore) * (upper + fore)) / (2 * fore), upper * bend.s};
+  return {(square - (upper - fore) * (upper + fore)) * half_inverse_fore, upper * bend.s};
 }
 
 ParallelShoulder MakeParallelShoulder(const ArmLines& lines, const Vector3d& wrist,
@@ -96,7 +96,7 @@ ParallelShoulder MakeParallelShoulder(const ArmLines& lines, const Vector3d& wri
   shoulder.x2 = second.x();
   shoulder.y2 = second.y();
   const auto upper = (third - second).head<2>(), fore = (end - third).head<2>();
-  shoulder.elbow = {upper.norm(), fore.norm()};
+  shoulder.elbow = PlanarElbow(upper.norm(), fore.norm());
   if (shoulder.elbow.upper <= tolerance) {
     throw std::invalid_argument("lines: axes 2 and 3 are the same");
   }
@@ -141,9 +141,7 @@ Turn ParallelShoulder::Upper(double x, double y, const Turn& bend, double free_a
   const double square = x * x + y * y;
   if (square < kReach * kReach) return TurnBy(free_angle);
   const auto [along, across] = elbow.UpperAngle(square, bend);
-  const Turn turn{along * x + across * y, along * y - across * x};
-  const double length = std::sqrt(turn.c * turn.c + turn.s * turn.s);
-  return {turn.c / length, turn.s / length};
+  return {along * x + across * y, along * y - across * x};
 }
 
 }  // namespace internal
@@ -341,7 +339,8 @@ void PieperArm::SolveParallel(const Vector3d& P, const Matrix3d& R_6, const IkOp
     for (const int elbow : {0, kElbow}) {
       if (elbow != 0 && bend.s == 0) continue;
       const Turn theta3 = elbow == 0 ? bend : -bend;
-      const Turn theta2 = shoulder_.Upper(x, y, theta3, FreeAngle(1, options));
+      const Turn theta2 =
+          internal::Normalized(shoulder_.Upper(x, y, theta3, FreeAngle(1, options)));
       const Matrix3d Z = F4t_ * BackAboutZ(theta2 + theta3, K_1);
       SetWrist(Z, options, {turns[base], theta2, theta3}, (base == 0 ? 0 : kShoulder) | elbow,
                pattern);

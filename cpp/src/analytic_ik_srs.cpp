@@ -120,11 +120,10 @@ SrsArm::SrsArm(const ArmLines& lines, double tolerance) : AnalyticArm(lines, 7) 
   const Vector3d upper = lines.points[3] + h[3] * h[3].dot(S_ - lines.points[3]) - S_;
   Vector3d fore = W - S_ - upper;
   fore -= h[3] * h[3].dot(fore);
-  upper_length_ = upper.norm();
-  fore_length_ = fore.norm();
-  if (upper_length_ <= tolerance || fore_length_ <= tolerance) {
+  if (upper.norm() <= tolerance || fore.norm() <= tolerance) {
     throw std::invalid_argument("lines: axis 4 passes through the shoulder or the wrist");
   }
+  elbow_ = internal::PlanarElbow(upper.norm(), fore.norm());
   p_GW_ = InTool(W);
   F1_ = FrameYZ(h[1], h[0]);
   R_GF7_ = InTool(FrameYZ(h[5], h[6]));
@@ -164,11 +163,10 @@ IkStatus SrsArm::Prepare(const double* X_WG, Target* target) const {
   const double D = v.norm();
   // Where the wrist is in the shoulder there is no arm angle.
   if (D < 1e-9) return IkStatus::kTooNear;
-  const internal::PlanarElbow elbow{upper_length_, fore_length_};
-  const IkStatus status = elbow.Bend(D, &target->bend);
+  const IkStatus status = elbow_.Bend(D, &target->bend);
   if (status != IkStatus::kSolved) return status;
-  target->at_shoulder = internal::Normalized(elbow.UpperAngle(D * D, target->bend));
-  target->at_wrist = internal::Normalized(elbow.ForeAngle(D * D, target->bend));
+  target->at_shoulder = internal::Normalized(elbow_.UpperAngle(D * D, target->bend));
+  target->at_wrist = internal::Normalized(elbow_.ForeAngle(D * D, target->bend));
   Reference(v / D, &target->D0);
   target->R_7 = R * R_GF7_;
   return IkStatus::kSolved;

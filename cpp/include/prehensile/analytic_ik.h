@@ -60,6 +60,58 @@ struct AngleIntervals {
   std::array<std::array<double, 2>, 32> bounds;
 };
 
+namespace internal {
+
+/// A unit vector of the plane, as an angle.
+struct Turn {
+  double c = 1, s = 0;
+};
+
+/// Two links that turn about parallel axes.
+struct PlanarElbow {
+  PlanarElbow() = default;
+  PlanarElbow(double upper_length, double fore_length)
+      : upper(upper_length),
+        fore(fore_length),
+        half_inverse_upper(0.5 / upper),
+        half_inverse_fore(0.5 / fore),
+        scale(half_inverse_upper * half_inverse_fore) {}
+  double upper, fore;  // Lengths.
+  double half_inverse_upper, half_inverse_fore, scale;
+  /// Cosine and sine >= 0 of the angle between the links when they span a distance.
+  IkStatus Bend(double distance, Turn* bend) const;
+  /// Angles, not normalized, of upper arm and forearm with the line from end to end, whose length's
+  /// square is given.
+  Turn UpperAngle(double square, const Turn& bend) const;
+  Turn ForeAngle(double square, const Turn& bend) const;
+};
+
+/// Joint 1 perpendicular to the parallel joints 2 and 3: the first three of most 6-joint arms.
+struct ParallelShoulder {
+  Eigen::Matrix3d B;      // [axis 1 × axis 2, axis 1, axis 2], the frame of all that follows.
+  Eigen::Vector3d point;  // On axis 1, in W.
+  double side;            // Coordinate along axis 2 of the point P that is to be reached.
+  double x2, y2;          // Where axis 2 is.
+  PlanarElbow elbow;
+  double upper_angle, bend_angle;  // Of the upper arm, and between the links, at q = 0.
+
+  /// The two solutions for joint 1, as turns, and the coordinates of P after turning back by them.
+  IkStatus Base(const Eigen::Vector3d& P, double q1_free, Turn turns[2], Eigen::Vector3d P_1[2],
+                int* count) const;
+  /// The direction, not normalized, of the upper arm that, bent so, points to (x, y) from axis 2.
+  Turn Upper(double x, double y, const Turn& bend, double free_angle) const;
+};
+
+/// Joints 1 and 2 that meet in a point, and any joint 3.
+struct MeetingShoulder {
+  Eigen::Vector3d point;  // Where axes 1 and 2 meet.
+  Eigen::Vector3d h1, h2, h3;
+  double constant, cosine, sine;          // |P - point|² as a function of joint 3.
+  Eigen::Vector3d along, across, height;  // P - point = height + along cos q₃ + across sin q₃.
+};
+
+}  // namespace internal
+
 /// A solution that was chosen among all arm angles and branches.
 struct ArmAngleChoice {
   IkStatus status = IkStatus::kSolved;
@@ -177,56 +229,12 @@ class SrsArm final : public AnalyticArm {
   ArmAngleChoice Choice(const Target& target, double psi, int branch, const double* q_near) const;
 
   Eigen::Vector3d S_, p_GW_;
-  double upper_length_, fore_length_;
+  internal::PlanarElbow elbow_;
   Eigen::Matrix3d F1_;     // [axis 2 × axis 1, axis 2, axis 1]; of the others likewise.
   Eigen::Matrix3d R_GF7_;  // [axis 6 × axis 7, axis 6, axis 7].
   Eigen::Matrix3d U0tF3_;  // Joint 3's frame in that of the upper arm.
   Eigen::Matrix3d F5tL0_;  // The forearm's frame in that of joint 5.
 };
-
-namespace internal {
-
-/// A unit vector of the plane, as an angle.
-struct Turn {
-  double c = 1, s = 0;
-};
-
-/// Two links that turn about parallel axes.
-struct PlanarElbow {
-  double upper, fore;  // Lengths.
-  /// Cosine and sine >= 0 of the angle between the links when they span a distance.
-  IkStatus Bend(double distance, Turn* bend) const;
-  /// Angles, not normalized, of upper arm and forearm with the line from end to end, whose length's
-  /// square is given.
-  Turn UpperAngle(double square, const Turn& bend) const;
-  Turn ForeAngle(double square, const Turn& bend) const;
-};
-
-/// Joint 1 perpendicular to the parallel joints 2 and 3: the first three of most 6-joint arms.
-struct ParallelShoulder {
-  Eigen::Matrix3d B;      // [axis 1 × axis 2, axis 1, axis 2], the frame of all that follows.
-  Eigen::Vector3d point;  // On axis 1, in W.
-  double side;            // Coordinate along axis 2 of the point P that is to be reached.
-  double x2, y2;          // Where axis 2 is.
-  PlanarElbow elbow;
-  double upper_angle, bend_angle;  // Of the upper arm, and between the links, at q = 0.
-
-  /// The two solutions for joint 1, as turns, and the coordinates of P after turning back by them.
-  IkStatus Base(const Eigen::Vector3d& P, double q1_free, Turn turns[2], Eigen::Vector3d P_1[2],
-                int* count) const;
-  /// The direction of the upper arm that, bent so, points to (x, y) from axis 2.
-  Turn Upper(double x, double y, const Turn& bend, double free_angle) const;
-};
-
-/// Joints 1 and 2 that meet in a point, and any joint 3.
-struct MeetingShoulder {
-  Eigen::Vector3d point;  // Where axes 1 and 2 meet.
-  Eigen::Vector3d h1, h2, h3;
-  double constant, cosine, sine;          // |P - point|² as a function of joint 3.
-  Eigen::Vector3d along, across, height;  // P - point = height + along cos q₃ + across sin q₃.
-};
-
-}  // namespace internal
 
 /// Arms of six joints whose axes 2, 3 and 4 are parallel, with axis 1 ⊥ axis 2, axis 4 ⊥ axis 5 ⊥
 /// axis 6, and axes 5 and 6 meeting in one point P (Universal Robots).
