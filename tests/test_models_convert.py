@@ -469,3 +469,36 @@ def test_the_command_prints_what_was_changed(tmp_path):
     )
     assert wrong.returncode == 2
     assert "NAME=PATH" in wrong.stderr
+
+
+def test_a_loop_of_an_sdf_is_closed_by_constraints(tmp_path):
+    # A parallelogram hanging from the world: the coupler stays level wherever it swings.
+    def link(name, x, z, size):
+        inertia = "<ixx>0.01</ixx><iyy>0.01</iyy><izz>0.01</izz>"
+        return (
+            f'<link name="{name}"><pose>{x} 0 {z} 0 0 0</pose><inertial><pose>{size} 0 0</pose>'
+            f"<mass>1</mass><inertia>{inertia}</inertia></inertial></link>"
+        )
+
+    def hinge(name, parent, child, x=0.0, z=0.0):
+        return (
+            f'<joint name="{name}" type="revolute"><pose>{x} 0 {z} 0 0 0</pose>'
+            f"<parent>{parent}</parent><child>{child}</child><axis><xyz>0 1 0</xyz>"
+            "<limit><effort>0</effort></limit></axis></joint>"
+        )
+
+    text = link("left", 0, 0, "0 0 -0.2 0") + link("right", 0.5, 0, "0 0 -0.2 0")
+    text += link("bar", 0, -0.4, "0.4 0 0 0") + hinge("a", "world", "left")
+    text += hinge("b", "world", "right") + hinge("c", "left", "bar")
+    text += hinge("d", "right", "bar", x=0.5)
+    source = tmp_path / "swing.sdf"
+    source.write_text(f'<sdf version="1.7"><model name="swing">{text}</model></sdf>')
+    done = convert(source, tmp_path / "out")
+    model = Loaded(done.path)
+    model.set(a=0.6, b=0.6, c=-0.6)
+    energies = model.simulate(0.5)
+    assert abs(model.position("a") - 0.6) > 0.3
+    np.testing.assert_allclose(model.pose("bar")[:3, :3], np.eye(3), atol=2e-3)
+    pin = model.pose("right") @ [0, 0, -0.4, 1]
+    np.testing.assert_allclose(model.pose("bar") @ [0.5, 0, 0, 1], pin, atol=1e-3)
+    assert energies.max() <= energies[0] + 1e-2

@@ -9,6 +9,7 @@ import numpy as np
 from prehensile.models.convert.elements import Source
 from prehensile.models.convert.inertias import InertiaMender
 from prehensile.models.convert.joints import JointMender
+from prehensile.models.convert.loops import open_loops
 from prehensile.models.convert.mesh_store import MeshStore
 from prehensile.models.convert.options import ConvertOptions
 from prehensile.models.convert.report import Report
@@ -67,6 +68,8 @@ def mend_tree(
         InputError: everything in it that cannot be mended.
     """
     urdf = model.tag == "robot"
+    if not urdf:
+        open_loops(model, source, report)
     tree = read_tree(model, source)
     if not tree.links:
         source.fault(model, "there are no links in it", "add a <link>")
