@@ -212,7 +212,6 @@ def model(name: str, side: int) -> Model:
         if segment.tip:
             end = (0.0, 0.0, segment.length, 0.0, 0.0, 0.0)
             frames.append(Frame(f"link_{i}_tip", f"link_{i}", end))
-    apart.append(("hand_root", "link_12", "link_13", "link_14"))
     hand = "Right" if side > 0 else "Left"
     return Model(
         name,

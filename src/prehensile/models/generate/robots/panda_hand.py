@@ -141,8 +141,9 @@ def generate(folder: Path) -> None:
             "Parallel gripper of the Panda; frame panda_hand has z to the finger tips and y along "
             "the closing direction, panda_hand_tcp lies between the pads. Joints "
             "panda_finger_joint1 and panda_finger_joint2 (0..0.04 m each); the opening is their "
-            "sum. The second follows the first (drake:mimic, in discrete plants). The pads are "
-            "compliant hydroelastic, everything else is rigid."
+            "sum. The second follows the first (drake:mimic, in discrete plants). On the Panda it "
+            "is welded to panda_link8, turned by -45 degrees about z. The pads are compliant "
+            "hydroelastic, everything else is rigid."
         ),
         sources=[
             "Franka Emika GmbH, Panda data sheet and hand manual: travel, grasping force, mass",
