@@ -1,6 +1,7 @@
 """What a planner knows of an arm: kinematics, joint limits, and what may collide with what."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +18,8 @@ from pydrake.planning import (
 )
 
 from prehensile.errors import InputError
+from prehensile.kinematics.analytic_ik import analytic_ik
+from prehensile.native.analytic_ik import PieperArm, SrsArm, UrArm
 from prehensile.planning.obstacles import HeightMap, body_points, shape_points
 
 
@@ -129,12 +132,28 @@ class ArmModel:
                 self.checker.SetCollisionFilteredBetween(a, b, True)
         self.weights = weights[self._index]
         self.frame_G: Frame = self.plant.GetFrameByName(gripper_frame, hand_instance)
+        self._closed_form: SrsArm | UrArm | PieperArm | None = None
+        with suppress(ValueError):  # An arm of another kind has no inverse in closed form.
+            self._closed_form = analytic_ik(self.plant, self.frame_G)
         self._context = self.plant.CreateDefaultContext()
         self._q = self.plant.GetPositions(self._context)
         self._padding = padding
         self._held_points: np.ndarray | None = None
         self._heights: HeightMap | None = None
         self.set_hand_width(np.inf)
+
+    def why_unreachable(self, X_WG: RigidTransform) -> str:
+        """Why no configuration brings the gripper frame to a pose, surroundings left aside.
+
+        Returns:
+            "too far", "too near" or "joint limits"; "" if there is such a configuration, or if
+            inverse kinematics of this arm has no closed form and nobody knows.
+        """
+        arm = self._closed_form
+        if arm is None:
+            return ""
+        solutions = arm.widest_interval(X_WG) if isinstance(arm, SrsArm) else arm.solve(X_WG)
+        return {"solved": "", "limits": "joint limits"}.get(solutions.status, solutions.status)
 
     @property
     def num_joints(self) -> int:

@@ -274,6 +274,8 @@ def _configurations(
                     found.append(q)
                 else:
                     reason = f"collides: {arm.collisions(q)}"
+    if not found and reason == "out of reach" and (why := arm.why_unreachable(poses[0])):
+        reason += f": {why}"
     return sorted(found, key=lambda q: travel_time(arm, q_start, q)), reason
 
 
