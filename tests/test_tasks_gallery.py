@@ -14,9 +14,11 @@ from prehensile.models.registry import list_models
 from prehensile.station.build import build
 from prehensile.station.guard import GuardLimits
 from prehensile.station.scenario_file import load_scenario
-from prehensile.tasks.gallery import Followed, arms, hands, run, run_demo
+from prehensile.tasks.gallery import Followed, run, run_demo
+from prehensile.tasks.gallery_motions import HOLD, swing, wave
 from prehensile.tasks.gallery_pairs import BOX_SIZE, bimanual, iiwa_allegro
-from prehensile.tasks.gallery_scenes import HOLD, gallery_robots, swing, wave
+from prehensile.tasks.gallery_robots import gallery_robots
+from prehensile.tasks.gallery_scenes import arms, hands
 
 ARMS = [info.name for info in list_models() if info.category == "arm"]
 HANDS = [info.name for info in list_models() if info.category == "hand"]

@@ -112,13 +112,13 @@ def _pick_place(args: argparse.Namespace) -> int:
 
 
 def _arms(args: argparse.Namespace) -> int:
-    from prehensile.tasks.gallery import arms
+    from prehensile.tasks.gallery_scenes import arms
 
     return _gallery(args, arms(args.controller, args.models))
 
 
 def _hands(args: argparse.Namespace) -> int:
-    from prehensile.tasks.gallery import hands
+    from prehensile.tasks.gallery_scenes import hands
 
     return _gallery(args, hands(args.models))
 

@@ -21,13 +21,11 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import Trajectory
 
-from prehensile.control.joint_controller import ControllerKind
 from prehensile.files import write_atomic, write_json
 from prehensile.station.build import build
 from prehensile.station.guard import GuardStatus
 from prehensile.station.scenario import Scenario
-from prehensile.station.scenario_file import loads_scenario
-from prehensile.tasks.gallery_scenes import HOLD, gallery_robots, scenario_text, swing, wave
+from prehensile.tasks.gallery_motions import HOLD
 
 TOLERANCE = 0.1
 """Greatest error (rad or m) with which a track counts as followed."""
@@ -292,36 +290,6 @@ class _Watch:
             guard=self._status.name,
             finite=bool(np.isfinite(rows).all()),
         )
-
-
-def arms(
-    controller: ControllerKind = "inverse-dynamics", names: Sequence[str] | None = None
-) -> Show:
-    """Every arm of the registry swings its joints.
-
-    Args:
-        controller: of all arms.
-        names: of the models wanted; default: all.
-    """
-    robots = gallery_robots("arm", names)
-    text = scenario_text(robots, controller, "The arms of the gallery.")
-    tracks = [Track(robot.info.name, swing(robot)) for robot in robots]
-    eye, target = (2.3, -0.9, 1.4), (-0.3, 0.0, 0.35)
-    return Show(loads_scenario(text), tracks, eye, target, controller=controller, text=text)
-
-
-def hands(names: Sequence[str] | None = None) -> Show:
-    """Every hand of the registry closes, opens and waves its fingers.
-
-    Args:
-        names: of the models wanted; default: all.
-    """
-    robots = gallery_robots("hand", names)
-    text = scenario_text(robots, "stiffness", "The hands of the gallery.")
-    tracks = [Track(robot.info.name, wave(robot)) for robot in robots if robot.joints]
-    still = [robot.info.name for robot in robots if not robot.joints]
-    eye, target = (0.7, 0.0, 0.6), (-0.2, 0.05, 0.27)
-    return Show(loads_scenario(text), tracks, eye, target, still, controller="stiffness", text=text)
 
 
 def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryReport:

@@ -19,7 +19,7 @@ from prehensile.station.guard import COMMAND_PERIOD
 from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario_file import load_scenario
 from prehensile.tasks.gallery import Show, Track
-from prehensile.tasks.gallery_scenes import HOLD
+from prehensile.tasks.gallery_motions import HOLD
 
 # The mirror image of an iiwa's posture in the plane through its base that halves it.
 MIRROR = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
