@@ -237,7 +237,7 @@ bool DifferentialIk::LeastSquares(const IkTaskRows& tasks, const LinearRows& con
   const int n = n_, m = relaxed ? n + 1 : n;
   const double scale = Scale(tasks, n);
   const double regularization = kRegularization * scale;
-  double d2 = regularization * regularization + options_.damping * options_.damping;
+  double d2 = options_.damping * options_.damping;
   LeastSquaresCost cost(m);
   double row[kMaxQpVariables] = {};
   for (int k = 0; k < tasks.num; ++k) {
@@ -260,6 +260,7 @@ bool DifferentialIk::LeastSquares(const IkTaskRows& tasks, const LinearRows& con
     }
   }
   if (posture) d2 += epsilon;
+  d2 = std::max(d2, regularization * regularization);
   const double d = std::sqrt(d2);
   for (int i = 0; i < n; ++i) cost.Regularize(i, d, posture ? epsilon / d2 * v_c[i] : 0.0);
   QpSolver solver;
