@@ -238,7 +238,7 @@ QpStatus QpSolver::Solve(LeastSquaresCost& cost, const double* c, const double* 
     if (p < 0) break;
     if (std::find(active_, active_ + num_active_, p) != active_ + num_active_) {
       // Already active, and yet violated: x has come from far and brought rounding errors along.
-      if (++corrections > 2) {
+      if (++corrections > 3) {
         clamp();
         return QpStatus::kNoProgress;
       }
@@ -292,6 +292,7 @@ QpStatus QpSolver::Solve(LeastSquaresCost& cost, const double* c, const double* 
       }
       if (t2 <= t1) {
         Add(p, side, u);
+        corrections = 0;
         taken = true;
       } else {
         Drop(leaving);
