@@ -116,7 +116,7 @@ def _load(info: ModelInfo) -> Robot:
     if info.category == "arm":
         (floor,) = parser.AddModels(str(DATA / "floor" / "floor.sdf"))
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link", floor))
-    if plant.GetBodiesWeldedTo(base)[0].index() != plant.world_body().index():
+    if plant.world_body().index() not in {b.index() for b in plant.GetBodiesWeldedTo(base)}:
         plant.WeldFrames(plant.world_frame(), base.body_frame())
     diagram = builder.Build()
     lower, upper = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
