@@ -82,10 +82,12 @@ class JointControllerPorts:
 def actuators_of(
     plant: MultibodyPlant, instances: Sequence[ModelInstanceIndex]
 ) -> list[JointActuator]:
-    """The actuators of models in the order of actuation ports, finalized plant or not."""
-    # Before the plant is finalized it lists actuators for all models together only.
-    every = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
-    return [a for instance in instances for a in every if a.model_instance() == instance]
+    """The actuators of models of a finalized plant, in the order of their actuation ports."""
+    return [
+        plant.get_joint_actuator(index)
+        for instance in instances
+        for index in plant.GetJointActuatorIndices(instance)
+    ]
 
 
 def controlled_joints(
@@ -144,34 +146,34 @@ def add_joint_controller(
     n = len(joints)
     if config.gains.size != n:
         raise ValueError(f"config: gains of {config.gains.size} joints where {n} are controlled")
-    add = _Adder(builder, plant, joints, name)
-    state = add.state(plant, joints, "state")
+    wire = _Wiring(builder, plant, joints, name)
+    state = wire.state(plant, joints, "state")
     if config.kind == "pid":
-        desired, effort = add.pid(config.gains, state)
+        desired, effort = wire.pid(config.gains, state)
     else:
         model = controller_plant or plant
         every = _moving_joints(model)
         if controller_plant is None and {j.model_instance() for j in every} - set(instances):
             raise ValueError("controller_plant: give one, other things move in this plant")
         if config.kind == "inverse-dynamics":
-            desired, effort = add.inverse_dynamics(config.gains, model, every)
+            desired, effort = wire.inverse_dynamics(config.gains, model, every)
         else:
-            effort = add.gravity_compensation(model, every)
+            effort = wire.gravity_compensation(model, every)
             if config.kind == "stiffness":
-                desired = add.springs(config.gains)
+                desired = wire.springs(config.gains)
             else:
-                desired, feedback = add.pid(config.gains, state)
-                effort = add.sum(effort, feedback, "effort")
+                desired, feedback = wire.pid(config.gains, state)
+                effort = wire.sum(effort, feedback, "effort")
     feedforward = None
     if config.feedforward:
         total = builder.AddNamedSystem(f"{name}.total_effort", Adder(2, n))
         builder.Connect(effort, total.get_input_port(0))
         feedforward, effort = total.get_input_port(1), total.get_output_port()
-    add.actuation(instances, effort)
+    wire.actuation(instances, effort)
     return JointControllerPorts(desired, state, feedforward)
 
 
-class _Adder:
+class _Wiring:
     """Adds the parts of a controller of ``joints`` to a diagram."""
 
     def __init__(
