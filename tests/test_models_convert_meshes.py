@@ -262,3 +262,18 @@ def test_materials_outside_of_the_folder_are_not_read(tmp_path):
     convert(tmp_path / "m" / "box.obj", tmp_path / "again")
     (part,) = read_gltf(tmp_path / "again" / "meshes" / "box.gltf")
     np.testing.assert_allclose(part.material.color, [0, 1, 0, 1], atol=0.01)
+
+
+def test_an_obj_without_a_color_takes_the_description_s(tmp_path):
+    obj = "".join(f"v {x:g} {y:g} {z:g}\n" for x, y, z in box_points((0.1, 0.1, 0.1)))
+    obj += "vt 0 0\nvt 1 0\nvt 1 1\n"
+    obj += "".join(f"f {a}/1 {b}/2 {c}/3\n" for a, b, c in BOX_FACES + 1)
+    (tmp_path / "box.obj").write_text(obj)
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r"><link name="a"><visual><geometry><mesh filename="box.obj"/></geometry>'
+        '<material name="m"><color rgba="0 1 0 1"/></material></visual></link></robot>'
+    )
+    convert(tmp_path / "r.urdf", tmp_path / "out")
+    (part,) = read_gltf(tmp_path / "out" / "meshes" / "box.gltf")
+    assert part.material.color == (0, 1, 0, 1)
+    assert part.material.texture is None

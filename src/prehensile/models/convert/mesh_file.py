@@ -23,6 +23,7 @@ MAX_BYTES = 256 << 20
 MAX_FACES = 2_000_000
 _MAX_TEXTURE_BYTES = 64 << 20
 _MAX_ACCESSOR = 50_000_000  # numbers in one array of a glTF file
+_UNSAID = [102, 102, 102, 255]  # trimesh's default
 _Z_FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
@@ -186,6 +187,9 @@ def _look(visual: Any, suffix: str) -> tuple[np.ndarray | None, Material | None]
     material = visual.material
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     uvs = visual.uv
+    # trimesh makes up a grey picture of a few pixels for an .obj that says nothing of its colour.
+    if list(material.main_color) == _UNSAID and (image is None or image.width * image.height <= 16):
+        return None, None
     if image is not None and uvs is not None:
         png = BytesIO()
         image.convert("RGB").save(png, "PNG")

@@ -23,16 +23,16 @@ class Geoms:
     """What the geoms of one body come to.
 
     Attributes:
-        visuals: ``<visual>`` of what does not touch.
-        touching: ``<visual>`` of what touches too.
+        visuals: ``<visual>`` of what does not touch, with its group.
+        touching: ``<visual>`` of what touches too, with its group.
         collisions: ``<collision>``.
         solids: of each geom that has mass, in the body's frame, with its density.
         bits: (contype, conaffinity) of what touches.
         weigh: whether the body's inertia is to be that of its geoms.
     """
 
-    visuals: list[Element] = field(default_factory=list)
-    touching: list[Element] = field(default_factory=list)
+    visuals: list[tuple[int, Element]] = field(default_factory=list)
+    touching: list[tuple[int, Element]] = field(default_factory=list)
     collisions: list[Element] = field(default_factory=list)
     solids: list[tuple[Solid, float]] = field(default_factory=list)
     bits: set[tuple[int, int]] = field(default_factory=set)
@@ -40,8 +40,10 @@ class Geoms:
 
     @property
     def elements(self) -> list[Element]:
-        """All; what touches is seen only where nothing is there just to be seen."""
-        return [*(self.visuals or self.touching), *self.collisions]
+        """All; what touches is not drawn where another group is there just to be seen."""
+        apart = {group for group, _ in self.visuals}
+        drawn = [seen for group, seen in self.touching if not apart or group in apart]
+        return [*(seen for _, seen in self.visuals), *drawn, *self.collisions]
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,11 @@ class GeomReader:
         pose = pose_element(X_BG, urdf=False)
         bits = (integer("contype", 1), integer("conaffinity", 1))
         rgba = self._rgba(geom, given)
-        if integer("group", 0) < _SHOWN and rgba[3] > 0:
+        group = integer("group", 0)
+        if group < _SHOWN and rgba[3] > 0:
             material = make("material", make("diffuse", numbers(rgba)))
             seen = make("visual", pose, make("geometry", geometry), material, name=name)
-            (geoms.touching if any(bits) else geoms.visuals).append(seen)
+            (geoms.touching if any(bits) else geoms.visuals).append((group, seen))
         if any(bits):
             geoms.bits.add(bits)
             friction = given.get("friction", "1").split()[0]
