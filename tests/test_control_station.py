@@ -135,3 +135,41 @@ def test_gains_of_another_number_of_joints_are_named(tmp_path):
     text = planar_arm(tmp_path, 3, "!IiwaDriver {desired_kp_gains: [1, 2]}")
     with pytest.raises(InputError, match="2 gains stand where 3 joints move"):
         build(loads_scenario(text))
+
+
+TWO = """
+plant_config: {{time_step: 0.002, discrete_contact_approximation: sap}}
+directives:
+- add_model: {{name: left, file: "package://prehensile/iiwa7/iiwa7.sdf"}}
+- add_weld: {{parent: world, child: "left::iiwa_link_0"}}
+- add_model: {{name: right, file: "package://prehensile/iiwa14/iiwa14.sdf"}}
+- add_weld:
+    parent: world
+    child: right::iiwa_link_0
+    X_PC: {{translation: [0, 1.5, 0]}}
+model_drivers:
+  {models}: {driver}
+"""
+
+
+@pytest.mark.parametrize("models", ["left+right", "right+left"])
+def test_two_arms_driven_as_one_in_the_order_of_their_names(models):
+    driver = "!JointPidDriver {gains: {right_iiwa_joint_1: {kp: 500, kd: 150}}}"
+    station = build(loads_scenario(TWO.format(models=models, driver=driver)))
+    simulator = Simulator(station)
+    context = simulator.get_mutable_context()
+    target = 0.005 * np.arange(1, 15)
+    station.GetInputPort(f"{models}.position").FixValue(context, target)
+    simulator.AdvanceTo(2.5)
+    measured = station.GetOutputPort(f"{models}.position_measured").Eval(context)
+    np.testing.assert_allclose(measured, target, atol=2e-3)
+    plant = station.plant()
+    first = plant.GetModelInstanceByName(models.split("+")[0])
+    q = plant.GetPositions(plant.GetMyContextFromRoot(context), first)
+    np.testing.assert_allclose(q, target[:7], atol=2e-3)
+
+
+def test_stiffness_drives_one_model_at_a_time():
+    text = TWO.format(models="left+right", driver="!JointStiffnessDriver {bandwidth: 20}")
+    with pytest.raises(InputError, match="one model"):
+        build(loads_scenario(text))
