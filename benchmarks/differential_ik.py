@@ -17,6 +17,11 @@ TITLE = "Differential inverse kinematics, one step, iiwa (7 joints)"
 COUNT = 256
 PERIOD = 0.01
 DAMPING = 1e-3
+# For the comparison of optima: so short a way that all definitions of a pose's error agree, so low
+# a speed that limits are active nonetheless, and so much damping that solvers are exact.
+TINY = 4e-6
+SLOW = 4e-4
+FIRM = 3e-2
 
 QP = "QP with bounds alone, J or H given"
 GIVEN = "direction kept, limits of q, v; J given"
@@ -47,6 +52,7 @@ def prepare(folder: Path) -> None:
         V_fast=rng.normal(size=(COUNT, 6)) * 0.3,
         X_near=tree.tree.poses(q + 0.002 * way),
         X_far=tree.tree.poses(q + 0.02 * way),
+        X_tiny=tree.tree.poses(q + TINY * way),
         lower=limits.lower,
         upper=limits.upper,
         velocity=limits.velocity,
@@ -193,6 +199,12 @@ def ours(folder: Path) -> Results:
     def frame_far(i: int) -> np.ndarray:
         return frame_ik.step(q[i], v[i], far[i]).v
 
+    slow = replace(still, velocity=SLOW * still.velocity)
+    slow_ik, tiny = (
+        compile_frame_ik(replace(least, damping=FIRM), slow, tree, [task]),
+        list(p["X_tiny"]),
+    )
+
     def system():
         return DifferentialInverseKinematics(tree, [task], direction, default_position=q[0])
 
@@ -211,6 +223,7 @@ def ours(folder: Path) -> Results:
         ("qp", qp),
         ("direction", lambda i: same_weight(i, still, V[i])),
         ("direction_fast", lambda i: same_weight(i, limits, fast[i])),
+        ("tiny", lambda i: slow_ik.step(q[i], zero, tiny[i]).v),
     ):
         for path in folder.glob(f"{name}.*.npy"):
             answers = np.load(path)
@@ -312,21 +325,34 @@ def mink(folder: Path) -> Results:
     model = mujoco.MjModel.from_xml_path(str(folder / "iiwa.urdf"))
     configuration = mink.Configuration(model)
     speeds = {f"iiwa_joint_{i + 1}": speed for i, speed in enumerate(p["velocity"])}
-    limits = [
-        mink.ConfigurationLimit(model, gain=1.0 - 1e-9),
-        mink.VelocityLimit(model, speeds),
+    position = mink.ConfigurationLimit(model, gain=1.0)
+    limits = [position, mink.VelocityLimit(model, speeds)]
+    slow = [
+        position,
+        mink.VelocityLimit(model, {name: SLOW * speed for name, speed in speeds.items()}),
     ]
     task = mink.FrameTask("iiwa_link_7", "body", position_cost=1.0, orientation_cost=1.0)
-    near, far = ([mink.SE3.from_matrix(T) for T in p[name]] for name in ("X_near", "X_far"))
+    near, far, tiny = (
+        [mink.SE3.from_matrix(T) for T in p[name]] for name in ("X_near", "X_far", "X_tiny")
+    )
     q = list(p["q"])
 
-    def frame(i: int, targets=near):
+    def frame(i: int, targets=near, limits=limits, damping=DAMPING, **settings: float):
         configuration.update(q[i])
         task.set_target(targets[i])
         return mink.solve_ik(
-            configuration, [task], PERIOD, solver="daqp", damping=DAMPING**2, limits=limits
+            configuration,
+            [task],
+            PERIOD,
+            solver="daqp",
+            damping=damping**2,
+            limits=limits,
+            **settings,
         )
 
+    np.save(
+        folder / "tiny.mink.npy", _answers(lambda i: frame(i, tiny, slow, FIRM, primal_tol=1e-12))
+    )
     return {FRAME: _time(frame), FRAME_FAR: _time(lambda i: frame(i, far))}
 
 
@@ -337,22 +363,32 @@ def oink(folder: Path) -> Results:
     p = np.load(folder / "problem.npz")
     urdf = (folder / "iiwa.urdf").read_text()
     scene = core.Scene("iiwa", core.loadUrdfSceneDescriptionFromXml(urdf))
-    solver = optimal_ik.Oink(scene)
-    limits = [
-        optimal_ik.PositionLimit(solver, gain=1.0),
-        optimal_ik.VelocityLimit(solver, PERIOD, p["velocity"]),
-    ]
-    near, far = ([np.asfortranarray(T) for T in p[name]] for name in ("X_near", "X_far"))
-    goal = core.CartesianConfiguration("iiwa_link_0", "iiwa_link_7", near[0])
-    tasks = [optimal_ik.FrameTask(solver, scene, goal)]
+    near, far, tiny = (
+        [np.asfortranarray(T) for T in p[name]] for name in ("X_near", "X_far", "X_tiny")
+    )
     q, step = list(p["q"]), np.zeros(7)
 
-    def frame(i: int, targets=near):
-        tasks[0].setTargetFrameTransform(targets[i])
-        solver.solveIk(q[i], tasks, limits, step, DAMPING**2)
-        return step
+    def stepper(solver, speed: np.ndarray, damping: float):
+        goal = core.CartesianConfiguration("iiwa_link_0", "iiwa_link_7", near[0])
+        tasks = [optimal_ik.FrameTask(solver, scene, goal)]
+        limits = [
+            optimal_ik.PositionLimit(solver, gain=1.0),
+            optimal_ik.VelocityLimit(solver, PERIOD, speed),
+        ]
 
-    return {FRAME: _time(frame), FRAME_FAR: _time(lambda i: frame(i, far))}
+        def frame(i: int, targets) -> np.ndarray:
+            tasks[0].setTargetFrameTransform(targets[i])
+            solver.solveIk(q[i], tasks, limits, step, damping**2)
+            return step
+
+        return frame
+
+    frame = stepper(optimal_ik.Oink(scene), p["velocity"], DAMPING)
+    settings = optimal_ik.OinkSettings()
+    settings.eps_abs = 1e-13
+    exact = stepper(optimal_ik.Oink(scene, settings), SLOW * p["velocity"], FIRM)
+    np.save(folder / "tiny.oink.npy", _answers(lambda i: exact(i, tiny)) / PERIOD)
+    return {FRAME: _time(lambda i: frame(i, near)), FRAME_FAR: _time(lambda i: frame(i, far))}
 
 
 def _box_qp(folder: Path):
