@@ -502,3 +502,19 @@ def test_a_loop_of_an_sdf_is_closed_by_constraints(tmp_path):
     pin = model.pose("right") @ [0, 0, -0.4, 1]
     np.testing.assert_allclose(model.pose("bar") @ [0.5, 0, 0, 1], pin, atol=1e-3)
     assert energies.max() <= energies[0] + 1e-2
+
+
+def test_a_long_chain_is_converted_and_an_endless_one_refused(tmp_path):
+    def chain(count):
+        links = "".join(f'<link name="l{i}"/>' for i in range(count))
+        joints = "".join(
+            f'<joint name="j{i}" type="fixed"><parent link="l{i}"/><child link="l{i + 1}"/></joint>'
+            for i in range(count - 1)
+        )
+        (tmp_path / "chain.urdf").write_text(f'<robot name="chain">{links}{joints}</robot>')
+        return tmp_path / "chain.urdf"
+
+    assert "links" in str(refusal(chain(3000), tmp_path / "out"))
+    done = convert(chain(300), tmp_path / "out")
+    # Nothing in it has mass: its first link gets some.
+    assert len(changes(done, "inertia")) == 1

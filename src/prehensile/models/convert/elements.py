@@ -13,6 +13,7 @@ from prehensile.models.convert.mesh_store import MeshStore
 from prehensile.models.convert.xml_text import make, number, numbers
 from prehensile.models.xml_lines import Element
 
+LEAST, GREATEST = 1e-7, 1e5  # m, of shapes
 PRIMITIVES = {
     "box": ("size",),
     "sphere": ("radius",),
@@ -94,8 +95,9 @@ class Source:
                         f"{kind}.{key}",
                     )
                 ]
-                if not all(s > 0 for s in size):
-                    self.fault(shape, f"the size of a {kind} is not > 0", "write its size")
+                if not all(LEAST < s < GREATEST for s in size):
+                    message = f"the size of a {kind} is not > 0, or out of all proportion"
+                    self.fault(shape, message, "write its size")
                     return None
                 return primitive(kind, size)
             if kind == "mesh":

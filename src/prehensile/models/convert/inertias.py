@@ -139,13 +139,18 @@ class InertiaMender:
                 outboard[parent].append(child)
                 inboard.add(child)
 
-        def carried(k: int, seen: frozenset[int]) -> float:
-            return total[k] + sum(carried(c, seen | {k}) for c in outboard[k] if c not in seen)
+        def carried(start: int) -> float:
+            seen, todo = {start}, [start]
+            while todo:
+                fresh = set(outboard[todo.pop()]) - seen
+                seen |= fresh
+                todo += fresh
+            return sum(total[k] for k in seen)
 
         needing = []
         for k in total:
             free = k not in inboard
-            mass = total[k] if free else carried(k, frozenset([k]))
+            mass = total[k] if free else carried(k)
             if k == group["world"] or mass > 0:
                 continue
             members = [name for name in masses if group[name] == k]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from prehensile.errors import InputError
-from prehensile.models.convert.elements import pose_element, transform
+from prehensile.models.convert.elements import GREATEST, LEAST, pose_element, transform
 from prehensile.models.convert.mass import Solid, primitive
 from prehensile.models.convert.mesh_store import MeshStore
 from prehensile.models.convert.mjcf_file import MeshAsset, MjcfFile, z_to
@@ -169,9 +169,9 @@ class GeomReader:
             width = size[:1]
             size = [*(width * (1 if count == 2 else 2)), repr(length)]
         values = source.floats(geom, " ".join(size[:count]), count, np.full(count, np.nan), "size")
-        if not (values > 0).all():
+        if not ((values > LEAST) & (values < GREATEST)).all():
             if not source.findings:
-                message = f"the size of a {kind} is not > 0"
+                message = f"the size of a {kind} is not > 0, or out of all proportion"
                 source.fault(geom, message, f"write {count} of them", "size")
             return None
         sizes = [float(v) for v in values]

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from prehensile.models.convert.elements import Source, value
 from prehensile.models.xml_lines import Element
 
+MAX_LINKS = 2000
+
 
 @dataclass(frozen=True)
 class JointRef:
@@ -44,14 +46,21 @@ class Tree:
 
     def rigid_groups(self) -> dict[str, int]:
         """Links that cannot move against one another have the same number; ``world`` has one."""
-        group = {name: i for i, name in enumerate([*self.links, "world"])}
-        if "world" not in self.links:
-            group["world"] = len(self.links)
+        above: dict[str, str] = {}  # towards the one link that stands for a group
+
+        def first(name: str) -> str:
+            while name in above:
+                name = above[name]
+            return name
+
+        names = {*self.links, "world"}
         for joint in self.joints:
-            if joint.moves or joint.parent not in group or joint.child not in group:
-                continue
-            old, new = group[joint.child], group[joint.parent]
-            group = {name: new if k == old else k for name, k in group.items()}
+            if not joint.moves and {joint.parent, joint.child} <= names:
+                parent, child = first(joint.parent), first(joint.child)
+                if parent != child:
+                    above[child] = parent
+        number = {name: i for i, name in enumerate(sorted(names))}
+        group = {name: number[first(name)] for name in names}
         return group
 
 
@@ -66,6 +75,10 @@ def read_tree(model: Element, source: Source) -> Tree:
     joints: dict[str, JointRef] = {}
     attached: dict[str, str] = {}
     _collect(model, "", links, joints, attached, source)
+    if len(links) > MAX_LINKS:
+        message = f"the model has {len(links)} links, more than {MAX_LINKS}"
+        source.fault(model, message, "take it apart")
+        source.raise_findings()
 
     def link_of(name: str) -> str:
         for _ in range(len(attached) + 1):
