@@ -277,3 +277,10 @@ def test_an_obj_without_a_color_takes_the_description_s(tmp_path):
     (part,) = read_gltf(tmp_path / "out" / "meshes" / "box.gltf")
     assert part.material.color == (0, 1, 0, 1)
     assert part.material.texture is None
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-9, 1e7, 1e200])
+def test_an_absurd_scale_is_refused(tmp_path, scale):
+    mesh = write_stl(tmp_path / "box.stl", box_points((0.1, 0.2, 0.3)), BOX_FACES)
+    with pytest.raises(InputError, match="m large"):
+        convert(mesh, tmp_path / "out", ConvertOptions(scale=scale))

@@ -17,6 +17,7 @@ from prehensile.models.shapes.mesh import WELD, Mesh, shade
 
 _MIN_THICKNESS = 1e-3  # m, of a box that stands for a flat mesh
 _MAX_TOTAL_FACES = 5 * MAX_FACES
+_LEAST, _GREATEST = 1e-6, 1e5  # m
 _LARGE = 20.0  # m; a mesh of this size has most likely another unit
 
 
@@ -145,6 +146,9 @@ class MeshStore:
             for p in self._pieces[uri]
         ]
         extent = max(float(np.ptp(p.vertices, axis=0).max()) for p in pieces)
+        if not _LEAST < extent < _GREATEST:
+            message = f"the mesh '{uri}' is {extent:g} m large"
+            raise InputError(Finding(message, "correct its scale"))
         if extent > _LARGE:
             text = f"{extent:.3g} m large: if it is in millimetres, convert with --units mm"
             self._report.add("note", _stem(uri), text)
