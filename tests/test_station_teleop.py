@@ -11,10 +11,11 @@ from pydrake.systems.framework import Diagram
 
 from prehensile.errors import InputError
 from prehensile.station.build import build
+from prehensile.station.guard import GuardLimits
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario, loads_scenario
 from prehensile.station.slider_source import Gamepad, Knob, SliderSource
-from prehensile.station.teleop import Arm, Mode, find_arm, teleoperate
+from prehensile.station.teleop import Arm, Mode, find_arm, pose_follower, teleoperate
 from prehensile.viz.meshcat import start_meshcat
 from prehensile.viz.sliders import Slider
 
@@ -114,6 +115,44 @@ def test_joint_limits_hold_when_the_goal_is_out_of_reach() -> None:
         assert (q > lower - 1e-3).all()
         assert (q < upper + 1e-3).all()
         assert np.isfinite(q).all()
+
+
+def test_the_arm_slides_along_its_limits_and_comes_to_rest() -> None:
+    """A goal beyond its reach draws the hand as near as the arm is long, and holds it there."""
+    scenario = load_scenario("iiwa_wsg")
+    arm = find_arm(build(scenario), scenario)
+    follower = pose_follower(arm, scenario, planar=False)
+    context = follower.CreateDefaultContext()
+    follower.GetInputPort("robot_state").FixValue(context, np.append(arm.q0, np.zeros(7)))
+    start = arm.start_pose()
+    wanted = follower.GetInputPort("X_AE_desired")
+    simulator = Simulator(follower, context)
+    commands = []
+
+    def follow(p: np.ndarray, seconds: float) -> np.ndarray:
+        """Where the hand is afterwards."""
+        wanted.FixValue(context, RigidTransform(start.rotation(), p))
+        for _ in range(round(seconds / 0.005)):
+            simulator.AdvanceTo((len(commands) + 0.5) * 0.005)
+            commands.append(follower.GetOutputPort("joint_positions").Eval(context).copy())
+        plant_context = arm.plant.CreateDefaultContext()
+        arm.plant.SetPositions(plant_context, commands[-1])
+        return arm.plant.EvalBodyPoseInWorld(plant_context, arm.end).translation()
+
+    out = follow(start.translation() + [0.8, 0.0, 0.2], 5.0)
+    assert out[0] > start.translation()[0] + 0.15
+    speeds = np.diff(commands, axis=0) / 0.005
+    assert np.abs(speeds[-200:]).max() < 2e-3, "no trembling"
+    aside = follow(start.translation() + [0.8, 0.4, 0.2], 5.0)
+    assert aside[1] > out[1] + 0.1, "it is not stuck"
+    back = follow(start.translation(), 6.0)
+    np.testing.assert_allclose(back, start.translation(), atol=2e-3)
+    limits = GuardLimits.of_plant(arm.plant, arm.plant.GetModelInstanceByName("iiwa"))
+    speeds = np.diff(commands, axis=0) / 0.005
+    assert (np.array(commands) <= np.array(limits.position_upper) + 1e-9).all()
+    assert (np.array(commands) >= np.array(limits.position_lower) - 1e-9).all()
+    assert (np.abs(speeds) <= np.array(limits.velocity) + 1e-9).all()
+    assert (np.abs(np.diff(speeds, axis=0)) / 0.005 <= np.array(limits.acceleration) + 1e-8).all()
 
 
 def test_planar_mode_stays_in_the_plane() -> None:
