@@ -15,8 +15,9 @@ help:  ## list the targets
 demo: .venv/.installed  ## watch an arm clear a bin, in the browser
 	$(RUN)/prehensile demo clear-bin
 
-test: .venv/.dev  ## the fast tests
+test: .venv/.dev  ## the fast tests, the examples among them
 	$(RUN)/python -m pytest -m "not slow"
+	@touch build/examples/.run
 
 test-all: .venv/.dev test-cpp  ## every test
 	$(RUN)/python -m pytest
