@@ -6,6 +6,7 @@ import zlib
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
@@ -17,6 +18,7 @@ from prehensile.kinematics.differential_ik import (
     compile_frame_ik,
     compile_ik,
 )
+from prehensile.kinematics.poses import pose_error
 from prehensile.kinematics.tree import PlantTree, tree_from_plant
 from prehensile.models.registry import package_map
 
@@ -25,13 +27,14 @@ RELAXED, BRAKING = 2, 3
 
 @functools.cache
 def iiwa() -> PlantTree:
+    """With the frames of its links 7 and 4."""
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
     parser.package_map().AddMap(package_map())
     parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
     plant.Finalize()
-    return tree_from_plant(plant, [plant.GetFrameByName("iiwa_link_7")])
+    return tree_from_plant(plant, [plant.GetFrameByName(f"iiwa_link_{i}") for i in (7, 4)])
 
 
 def reference(J, V, lower, upper, *, damping=0.0, rows=None):
@@ -165,6 +168,40 @@ def test_rollouts_repeat_single_steps():
     assert (status <= 1).all()
     reached = tree.tree.poses(q_end)
     np.testing.assert_allclose(reached[:, :3, 3], X_WD[:, 0, :3, 3], atol=2e-3)
+
+
+def test_frame_tasks_are_rows_of_their_jacobians():
+    """Weights, axes, gains, greatest speeds and priorities by the definitions, from poses."""
+    tree, rng = iiwa(), np.random.default_rng(3)
+    limits = JointLimits.of_tree(tree)
+    tasks = [
+        FrameTask(frame=1, weights=(0, 0, 0, 1, 0, 3), axes="frame", priority=1, max_linear=0.05),
+        FrameTask(frame=0, weights=(2, 1, 0, 1, 1, 0.5), gain=4.0, max_angular=0.3),
+    ]
+    for formulation in ("least_squares", "priorities"):
+        config = DifferentialIkConfig(formulation=formulation, period=0.01)
+        frames = compile_frame_ik(config, limits, tree, tasks)
+        joints = compile_ik(config, limits)
+        for _ in range(20):
+            q = 0.8 * rng.uniform(limits.lower, limits.upper)
+            v, near = 0.05 * rng.normal(size=7), q + 0.1 * rng.normal(size=7)
+            goals = [RigidTransform(tree.tree.pose(near, task.frame)) for task in tasks]
+            V_extra = 0.1 * rng.normal(size=(2, 6))
+            parts = []
+            for task, goal, extra in zip(tasks, goals, V_extra, strict=True):
+                X, J = tree.tree.pose_and_jacobian(q, task.frame)
+                V = task.gain * pose_error(RigidTransform(X), goal) + extra
+                for part, most in ((V[:3], task.max_angular), (V[3:], task.max_linear)):
+                    part *= min(1.0, most / np.linalg.norm(part))
+                if task.axes == "frame":
+                    turn = np.kron(np.eye(2), X[:3, :3].T)
+                    J, V = turn @ J, turn @ V
+                used = np.array(task.weights) > 0
+                parts.append((J[used], V[used], np.array(task.weights)[used]))
+            J, V, w = (np.concatenate(each) for each in zip(*parts[::-1], strict=True))
+            expected = joints.step(q, v, J, V, w, [5, 2]).v
+            X_WD = np.array([goal.GetAsMatrix4() for goal in goals])
+            np.testing.assert_allclose(frames.step(q, v, X_WD, V_extra).v, expected, atol=1e-9)
 
 
 # Limits, whatever comes in.

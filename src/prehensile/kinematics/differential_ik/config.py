@@ -34,8 +34,8 @@ class DifferentialIkConfig:
             by "direction", and by "priorities" in the first level only.
         centering: "nullspace": ε |P (v − v_c)|² with v_c = K (q_0 − q), the rows of P an
             orthonormal basis of the kernel of J; for "priorities" the last level, strictly.
-            "posture": ε |v − v_c|², which disturbs the task a little, but not more at a singularity,
-            where the kernel of J, and with it P, jumps.
+            "posture": ε |v − v_c|², which disturbs the task a little, but is smooth beside
+            singularities too, where the kernel of J, and with it P, jumps.
         centering_weight: ε (> 0); "direction" and "priorities" do not use it.
         centering_gain: K in 1/s, one for all joints or one each.
         nominal_position: q_0 (n,); needed for centering.

@@ -175,10 +175,11 @@ def direction_preserving(
 ) -> IkResult:
     """max w α − |P (v_n − K (q_0 − q))|² subject to J v_n = α V, 0 ≤ α ≤ 1, and limits (24).
 
-    This is the program of Drake's ``DoDifferentialInverseKinematics`` (w = 100), but for the
-    sharper limits of position, and that a V longer than the joints' speeds permit is shortened
-    first, so that α does not lose against the centering. For w large enough α is the greatest
-    possible, and the centering chooses among what is left (an exact penalty).
+    This is the program of Drake's ``DoDifferentialInverseKinematics`` (w = 100, the rows of P there
+    not normalized), but for the sharper limits of position, and that a V longer than the joints'
+    speeds permit is shortened first, so that α does not lose against the centering. For w large
+    enough α is the greatest possible, and the centering chooses among what is left (an exact
+    penalty).
 
     If v_n = 0 is out of reach of the limits of acceleration there may be no such v_n: the result is
     then BRAKING.
