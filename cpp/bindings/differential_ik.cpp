@@ -15,6 +15,7 @@
 
 #include "bindings.h"
 #include "numpy_arrays.h"
+#include "prehensile/frame_ik.h"
 
 namespace nb = nanobind;
 using nb::literals::operator""_a;
