@@ -239,7 +239,9 @@ def test_dwells_at_both_ends_and_repeated_poses(tree):
     ("change", "message"),
     [
         ({"dwell": -1.0}, "dwell and blend"),
+        ({"dwell": np.inf}, "dwell and blend"),
         ({"blend": np.nan}, "dwell and blend"),
+        ({"width": np.nan}, "width"),
         ({"blend": 0.1, "dwell": 0.1}, "has to rest"),
     ],
 )
@@ -256,3 +258,27 @@ def test_misuse_is_named(change, message):
         keyframe_motion(frames, [1.0, 1.0])
     with pytest.raises(ValueError, match="durations must be 1"):
         keyframe_motion(frames[1:], [1.0, 1.0])
+
+
+def test_misuse_of_an_arm_is_named(tree):
+    X_WG = RigidTransform(tree.tree.pose(Q_HOME, 0))
+    there = RigidTransform(X_WG.rotation(), X_WG.translation() + [0.0, 0.05, 0.0])
+    frames = [Keyframe("here", X_WG), Keyframe("there", there)]
+    for change, message in (
+        ({"velocity": np.full(7, np.inf), "acceleration": np.full(7, np.inf)}, "has no limit"),
+        ({"velocity": [1.0, 1.0]}, "^velocity"),
+        ({"q_nominal": np.full(7, np.nan)}, "^q_nominal"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            time_keyframes(tree, 0, Q_HOME, frames, **change)
+    for change in ({"speed": 1.5}, {"acceleration": np.nan}, {"law": "sudden"}):
+        with pytest.raises(ValueError, match=f"^{next(iter(change))}"):
+            TimingConfig(**change)
+
+
+def test_arm_that_has_nowhere_to_go_stays(tree):
+    X_WG = RigidTransform(tree.tree.pose(Q_HOME, 0))
+    motion = time_keyframes(tree, 0, Q_HOME, [Keyframe("a", X_WG), Keyframe("b", X_WG)])
+    assert motion.found
+    assert motion.duration == 0.0
+    np.testing.assert_allclose(motion.joints.value(0.0).ravel(), Q_HOME, atol=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from prehensile.kinematics.timing import LAWS, least_duration
 
@@ -83,11 +83,21 @@ def test_no_limit_takes_no_time():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([0.0, 1.0], [1.0, 1.0]), "must be positive"),
-        (([1.0, 1.0], [1.0, np.nan]), "must be positive"),
+        (([0.0, 1.0], [1.0, 1.0]), "positive numbers"),
+        (([1.0, 1.0], [1.0, np.nan]), "positive numbers"),
         (([1.0, 1.0], [1.0, 1.0], "septic"), "law must be one of"),
     ],
 )
 def test_misuse_is_named(arguments, message):
     with pytest.raises(ValueError, match=message):
         least_duration(LINE, *arguments)
+
+
+def test_limits_that_do_not_fit_are_named():
+    path = CubicSpline([0.0, 1.0, 2.0], [[0.0, 0.0], [1.0, 0.5], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="^velocity"):
+        least_duration(path, [1.0, 1.0, 1.0], [1.0, 1.0])
+    with pytest.raises(ValueError, match="^acceleration"):
+        least_duration(path, [1.0, 1.0], [1.0, -1.0])
+    with pytest.raises(ValueError, match="^path"):
+        least_duration(PPoly(np.full((4, 1, 2), np.nan), [0.0, 1.0]), 1.0, 1.0)

@@ -164,3 +164,22 @@ def test_misuse_is_named(tree):
         trace_path(tree, 0, lambda s: RigidTransform(), 0, 1, np.zeros(6), q_nominal=Q_HOME)
     with pytest.raises(ValueError, match="q_nominal must be"):
         trace_path(tree, 0, lambda s: RigidTransform(), 0, 1, Q_HOME, q_nominal=np.zeros(8))
+
+
+def test_what_is_out_of_range_is_named(tree):
+    X = pose_at(tree, Q_HOME)
+    for start, end in ((1.0, 1.0), (1.0, 0.0), (0.0, np.nan)):
+        with pytest.raises(ValueError, match="^s_start, s_end"):
+            trace_path(tree, 0, lambda s: X, start, end, Q_HOME)
+    for q in (Q_HOME[:5], np.full(7, np.nan)):
+        with pytest.raises(ValueError, match="^q_start"):
+            trace_path(tree, 0, lambda s: X, 0.0, 1.0, q)
+    for change in (
+        {"tolerance": np.nan},
+        {"translation": 0.0},
+        {"rotation": -1.0},
+        {"max_joint_step": 2.0},
+        {"max_refinements": 0},
+    ):
+        with pytest.raises(ValueError, match=f"^{next(iter(change))}"):
+            TracingConfig(**change)

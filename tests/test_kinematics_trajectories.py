@@ -8,7 +8,12 @@ from pydrake.trajectories import PiecewisePose
 
 from prehensile.kinematics.poses import pose_distance, random_pose
 from prehensile.kinematics.rotations import unskew
-from prehensile.kinematics.trajectories import PoseTrajectory, blended_trajectory, pose_trajectory
+from prehensile.kinematics.trajectories import (
+    PoseTrajectory,
+    blended_trajectory,
+    law_progress,
+    pose_trajectory,
+)
 
 TIMES = [0.5, 1.0, 2.5, 3.0]
 
@@ -171,3 +176,23 @@ def test_as_drake_trajectories():
 def test_misuse_is_named(call, message):
     with pytest.raises(ValueError, match=message):
         call(random_poses(0, 2))
+
+
+def test_what_is_out_of_range_is_named():
+    A, B = random_poses(0, 2)
+    with pytest.raises(ValueError, match="^poses"):
+        PoseTrajectory([], [])
+    with pytest.raises(ValueError, match="^poses"):
+        blended_trajectory([], [A], [0.0])
+    for bad in (np.inf, np.nan, 0.0):
+        with pytest.raises(ValueError, match="^durations"):
+            blended_trajectory([bad], [A, B], [0.0, 0.0])
+    with pytest.raises(ValueError, match="^start_time"):
+        blended_trajectory([1.0], [A, B], [0.0, 0.0], start_time=np.nan)
+    for start, end in ((1.0, 1.0), (1.0, 0.0), (0.0, np.inf)):
+        with pytest.raises(ValueError, match="^start, end"):
+            law_progress(start, end, "cubic")
+    with pytest.raises(ValueError, match="^law"):
+        law_progress(0.0, 1.0, "sudden")
+    with pytest.raises(ValueError, match="no second"):
+        pose_trajectory([0.0, 1.0], [A, B]).drake_velocity().EvalDerivative(0.5, 2)

@@ -31,8 +31,8 @@ from pydrake.trajectories import (
 )
 from scipy.interpolate import CubicSpline, PPoly
 
-from prehensile.kinematics.timing import LAWS, Law, least_duration
-from prehensile.kinematics.tracing import TracedPath, TracingConfig, trace_path
+from prehensile.kinematics.timing import Law, law_polynomial, least_duration
+from prehensile.kinematics.tracing import TracedPath, TracingConfig, checked_positions, trace_path
 from prehensile.kinematics.trajectories import (
     Blend,
     PoseTrajectory,
@@ -81,6 +81,12 @@ class TimingConfig:
     speed: float = 1.0
     acceleration: float = 1.0
     tracing: TracingConfig = field(default_factory=TracingConfig)
+
+    def __post_init__(self) -> None:
+        law_polynomial(self.law)
+        for name in ("speed", "acceleration"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must be in (0, 1], got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -194,7 +200,9 @@ def keyframe_motion(
     """
     _check(keyframes)
     durations = np.asarray(durations, float)
-    if durations.shape != (len(keyframes) - 1,) or not np.all(durations > 0.0):
+    if durations.shape != (len(keyframes) - 1,) or not (
+        np.all(durations > 0.0) and np.isfinite(durations).all()
+    ):
         raise ValueError(f"durations must be {len(keyframes) - 1} positive numbers")
     build = _Builder(keyframes)
     for first, last in _stretches(keyframes):
@@ -234,16 +242,22 @@ def time_keyframes(
         The motion, or why there is none and between which keyframes.
 
     Raises:
-        ValueError: fewer than two keyframes or one that is out of range.
+        ValueError: fewer than two keyframes or one that is out of range; another number of joints,
+            or a joint with neither limit.
     """
     config = config or TimingConfig()
     _check(keyframes)
-    v_max = config.speed * np.asarray(tree.velocity if velocity is None else velocity, float)
-    a_max = config.acceleration * np.asarray(
-        tree.acceleration if acceleration is None else acceleration, float
-    )
-    q_start = np.asarray(q_start, float)
-    q_nominal = q_start if q_nominal is None else np.asarray(q_nominal, float)
+    n = len(tree.joints)
+    v_max = np.asarray(tree.velocity if velocity is None else velocity, float)
+    a_max = np.asarray(tree.acceleration if acceleration is None else acceleration, float)
+    if v_max.shape != (n,) or a_max.shape != (n,):
+        raise ValueError(f"velocity, acceleration: expected {n} numbers each")
+    v_max, a_max = config.speed * v_max, config.acceleration * a_max
+    for name, unlimited in zip(tree.joints, np.isinf(np.minimum(v_max, a_max)), strict=True):
+        if unlimited:  # it would be there in no time
+            raise ValueError(f"velocity, acceleration: joint {name} has no limit")
+    q_start = checked_positions(tree, q_start, "q_start")
+    q_nominal = q_start if q_nominal is None else checked_positions(tree, q_nominal, "q_nominal")
 
     def trace(poses: PoseTrajectory, q: Array, at_rest: bool) -> TracedPath:
         return trace_path(
@@ -292,8 +306,10 @@ def _check(keyframes: Sequence[Keyframe]) -> None:
     if len(keyframes) < 2:
         raise ValueError("keyframes: at least two are needed")
     for i, k in enumerate(keyframes):
-        if not (k.dwell >= 0.0 and k.blend >= 0.0):
+        if not (0.0 <= k.dwell < np.inf and k.blend >= 0.0):
             raise ValueError(f"keyframes: {k.name}: dwell and blend must not be negative")
+        if k.width is not None and not np.isfinite(k.width):
+            raise ValueError(f"keyframes: {k.name}: width must be finite")
         if k.blend > 0.0 and (k.dwell > 0.0 or i in (0, len(keyframes) - 1)):
             raise ValueError(f"keyframes: {k.name}: blends where the hand has to rest")
 
@@ -370,10 +386,16 @@ class _Builder:
             np.array(self._times),
             PoseTrajectory([k.X_WG for k in self._keyframes], self._progress, self._t),
             self._widths(),
-            CompositeTrajectory(self._joints) if self._joints else None,
+            self._joint_positions(),
             self._q,
             tuple(self._limits),
         )
+
+    def _joint_positions(self) -> Trajectory | None:
+        if self._joints:
+            return CompositeTrajectory(self._joints)
+        # Of an arm that has no way to go, the place.
+        return PiecewisePolynomial(self._q[:, None]) if len(self._q) else None
 
     def failed(self, status: str, reason: str) -> KeyframeMotion:
         """No motion."""
@@ -411,7 +433,7 @@ def _timed(path: CubicSpline, law: Law, start: float, end: float) -> Trajectory:
     q = PiecewisePolynomial.CubicHermite(path.x, path(path.x).T, path(path.x, 1).T)
     duration, first, length = end - start, path.x[0], path.x[-1] - path.x[0]
     # PiecewisePolynomial counts time from the start of a segment.
-    powers = [length * c / duration**k for k, c in enumerate(LAWS[law].coef)]
+    powers = [length * c / duration**k for k, c in enumerate(law_polynomial(law).coef)]
     powers[0] += first
     scaling = PiecewisePolynomial([np.array([[Polynomial(np.array(powers))]])], [start, end])
     return PathParameterizedTrajectory(q, scaling)

@@ -28,13 +28,25 @@ LAWS: dict[Law, Polynomial] = {
 _INTERVALS = 4096
 
 
+def law_polynomial(law: Law) -> Polynomial:
+    """The polynomial of a timing law, s(tau).
+
+    Raises:
+        ValueError: no such law.
+    """
+    if law not in get_args(Law):
+        raise ValueError(f"law must be one of {', '.join(get_args(Law))}, got {law!r}")
+    return LAWS[law]
+
+
 @dataclass(frozen=True)
 class Duration:
     """The least duration of a path.
 
     Attributes:
         duration: seconds.
-        joint: number of the joint that does not allow less; -1 if nothing moves.
+        joint: number of the joint that does not allow less; -1 if nothing moves
+            that has a limit.
         limit: which of its limits.
         at: path parameter s, as a fraction of the path, where it is met.
     """
@@ -57,27 +69,33 @@ def least_duration(
     Args:
         path: q(s) with continuous second derivative, piecewise cubic, values (n,), on any
             interval; such as a ``scipy.interpolate.CubicSpline``.
-        velocity: (n,) largest absolute velocities, > 0, inf for none.
-        acceleration: (n,) largest absolute accelerations, > 0, inf for none.
+        velocity: (n,) largest absolute velocities, > 0, inf for none; or one for all.
+        acceleration: (n,) largest absolute accelerations, > 0, inf for none; or one for all.
         law: how s runs over the interval.
 
     Returns:
         The duration and what sets it.
 
     Raises:
-        ValueError: a limit that is not positive, or no such law.
+        ValueError: a limit that is not positive or limits of another number of joints, a path that
+            is not finite, or no such law.
     """
-    if law not in get_args(Law):
-        raise ValueError(f"law must be one of {', '.join(get_args(Law))}, got {law!r}")
-    v_max, a_max = (np.asarray(limit, float) for limit in (velocity, acceleration))
-    if not (np.all(v_max > 0.0) and np.all(a_max > 0.0)):
-        raise ValueError("velocity, acceleration: limits must be positive")
+    s = law_polynomial(law)
+    n = path.c.shape[2:]
+    limits = []
+    for name, limit in (("velocity", velocity), ("acceleration", acceleration)):
+        limit = np.asarray(limit, float)
+        if limit.shape not in ((), n) or not np.all(limit > 0.0):
+            raise ValueError(f"{name}: expected {n} positive numbers, got {limit}")
+        limits.append(limit)
+    v_max, a_max = limits
+    if not (np.isfinite(path.c).all() and np.isfinite(path.x).all()):
+        raise ValueError("path: must be finite")
     start, length = float(path.x[0]), float(path.x[-1] - path.x[0])
     # The derivatives by s on [0, 1].
     first, second, third = (path.derivative(k) for k in (1, 2, 3))
     tau = np.linspace(0.0, 1.0, _INTERVALS + 1)
     h = 1.0 / _INTERVALS
-    s = LAWS[law]
     s1, s2, s3 = (s.deriv(k)(tau)[:, None] for k in (1, 2, 3))
     at = start + length * s(tau)
     q1, q2 = length * first(at), length**2 * second(at)

@@ -54,6 +54,19 @@ class TracingConfig:
     max_joint_step: float = 0.3
     max_refinements: int = 4
 
+    def __post_init__(self) -> None:
+        for name, largest in (
+            ("tolerance", 0.01),
+            ("translation", 0.2),
+            ("rotation", 0.5),
+            ("max_joint_step", 1.0),
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value <= largest:
+                raise ValueError(f"{name} must be in (0, {largest:g}], got {value}")
+        if not 1 <= self.max_refinements <= 8:
+            raise ValueError(f"max_refinements must be 1 to 8, got {self.max_refinements}")
+
 
 @dataclass(frozen=True)
 class TracedPath:
@@ -109,13 +122,14 @@ def trace_path(
         config: tolerances.
 
     Raises:
-        ValueError: q_start or q_nominal of another shape.
+        ValueError: s_start and s_end do not increase; q_start or q_nominal of another shape or not
+            finite; no such frame.
     """
     config = config or TracingConfig()
-    q_start = np.asarray(q_start, float)
+    if not 0.0 < s_end - s_start < np.inf:
+        raise ValueError(f"s_start, s_end: must be finite and increase, got {s_start}, {s_end}")
+    q_start = checked_positions(tree, q_start, "q_start")
     posture = posture_near(tree, q_start if q_nominal is None else q_nominal)
-    if q_start.shape != posture.nominal.shape:
-        raise ValueError(f"q_start must be ({len(tree.joints)},), got {q_start.shape}")
     distance, angle = pose_distance(_pose(tree, frame, q_start), pose(s_start))
     if distance > config.tolerance or angle > config.tolerance:
         off = f"{1e3 * distance:.2f} mm and {angle:.4f} rad"
@@ -165,14 +179,24 @@ class Posture:
         return q - self.nominal + slope, 1.0 + 12.0 * _SHY_WEIGHT * (high**2 + low**2)
 
 
+def checked_positions(tree: PlantTree, q: ArrayLike, name: str) -> Array:
+    """Positions of a tree's joints, (n,), checked.
+
+    Raises:
+        ValueError: of another shape or not finite; the message begins with the name.
+    """
+    q = np.asarray(q, float)
+    if q.shape != (len(tree.joints),) or not np.isfinite(q).all():
+        raise ValueError(f"{name} must be {len(tree.joints)} finite numbers, got {q}")
+    return q
+
+
 def posture_near(tree: PlantTree, q_nominal: ArrayLike) -> Posture:
     """The posture of a nominal configuration within the limits of a tree.
 
     The margins are such that the nominal configuration is outside of them.
     """
-    q = np.asarray(q_nominal, float)
-    if q.shape != (len(tree.joints),):
-        raise ValueError(f"q_nominal must be ({len(tree.joints)},), got {q.shape}")
+    q = checked_positions(tree, q_nominal, "q_nominal")
     # A spline through solutions may pass a little beyond them.
     lower = np.minimum(tree.lower + _LIMIT_GAP, q)
     upper = np.maximum(tree.upper - _LIMIT_GAP, q)

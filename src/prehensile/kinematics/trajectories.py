@@ -27,7 +27,7 @@ from pydrake.trajectories import FunctionHandleTrajectory, Trajectory
 from scipy.interpolate import PPoly
 
 from prehensile.kinematics.rotations import exp_so3, log_so3
-from prehensile.kinematics.timing import LAWS, Law
+from prehensile.kinematics.timing import Law, law_polynomial
 
 Array = NDArray[np.float64]
 
@@ -78,6 +78,8 @@ class PoseTrajectory:
                 before and after.
             end_time: default: when the last leg ends (0 if there is none).
         """
+        if not poses:
+            raise ValueError("poses: at least one is needed")
         if len(poses) != len(progress) + 1:
             raise ValueError(f"progress must have {len(poses) - 1} entries, got {len(progress)}")
         self.poses = tuple(poses)
@@ -134,12 +136,16 @@ class PoseTrajectory:
 
         It calls back into Python at every evaluation.
         """
+
+        def derivative(t: float, order: int) -> Array:
+            if order > 1:
+                raise ValueError("derivative_order: there is no second derivative")
+            return self.acceleration(t) if order == 1 else self.velocity(t)
+
         trajectory = FunctionHandleTrajectory(
             lambda t: self.velocity(t)[:, None], 6, 1, self.start_time, self.end_time
         )
-        trajectory.set_derivative(
-            lambda t, order: (self.velocity(t), self.acceleration(t))[order][:, None]
-        )
+        trajectory.set_derivative(lambda t, order: derivative(t, order)[:, None])
         return trajectory
 
     def drake_pose(self) -> Trajectory:
@@ -166,20 +172,25 @@ def pose_trajectory(
         ValueError: times of another number, not increasing or not finite; no such law.
     """
     times = np.asarray(times, float)
-    if times.shape != (len(poses),) or len(poses) < 1:
+    if times.shape != (len(poses),):
         raise ValueError(f"times must be ({len(poses)},), got {times.shape}")
     if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0.0)):
         raise ValueError("times must increase and be finite")
-    if law not in get_args(Law):
-        raise ValueError(f"law must be one of {', '.join(get_args(Law))}, got {law!r}")
+    law_polynomial(law)  # there is such a law, even where there is no leg
     progress = [law_progress(a, b, law) for a, b in pairwise(times)]
     return PoseTrajectory(poses, progress)
 
 
 def law_progress(start: float, end: float, law: Law) -> PPoly:
-    """The progress of a leg by a timing law between two times."""
+    """The progress of a leg by a timing law between two times, start < end.
+
+    Raises:
+        ValueError: no time between them, or no such law.
+    """
     duration = end - start
-    powers = [c / duration**k for k, c in enumerate(LAWS[law].coef)]
+    if not 0.0 < duration < np.inf:
+        raise ValueError(f"start, end: must be finite and increase, got {start}, {end}")
+    powers = [c / duration**k for k, c in enumerate(law_polynomial(law).coef)]
     return PPoly(np.array(powers[::-1])[:, None], [start, end])
 
 
@@ -207,11 +218,15 @@ def blended_trajectory(
         start_time: in s.
 
     Raises:
-        ValueError: another number of durations or distances, or out of range.
+        ValueError: fewer than two poses, another number of durations or distances, or out of range.
     """
     T, r = np.asarray(durations, float), np.asarray(distances, float)
-    if len(poses) < 2 or T.shape != (len(poses) - 1,) or not np.all(T > 0.0):
+    if len(poses) < 2:
+        raise ValueError(f"poses: at least two are needed, got {len(poses)}")
+    if T.shape != (len(poses) - 1,) or not np.all((T > 0.0) & np.isfinite(T)):
         raise ValueError(f"durations must be {len(poses) - 1} positive numbers, got {T}")
+    if not np.isfinite(start_time):
+        raise ValueError(f"start_time must be finite, got {start_time}")
     if r.shape != (len(poses),) or not np.all(r >= 0.0):
         raise ValueError(f"distances must be {len(poses)} numbers >= 0, got {r}")
     if blend not in get_args(Blend):
