@@ -158,6 +158,12 @@ def test_closest_singularity_along_a_path(iiwa):
         (lambda: velocity_ellipsoid(np.eye(3), joint_speeds=[1, 2]), "joint_speeds"),
         (lambda: force_ellipsoid(np.eye(3), joint_efforts=[1, 0, 1]), "joint_efforts"),
         (lambda: velocity_ellipsoid(np.ones(3)), "J"),
+        (lambda: velocity_ellipsoid(np.full((3, 3), np.nan)), "J"),
+        (lambda: velocity_ellipsoid(np.ones(3), joint_speeds=[1, 2, 3]), "J"),
+        (lambda: singular_values([1, 2]), "J"),
+        (lambda: manipulability(np.full((3, 3), np.inf)), "J"),
+        (lambda: rank(np.ones((2, 3, 3))), "J"),
+        (lambda: rank(np.eye(3), tolerance=np.nan), "tolerance"),
     ],
 )
 def test_bad_arguments_are_named(call, argument):

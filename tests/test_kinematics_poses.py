@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -77,3 +78,9 @@ def test_random_poses_lie_in_their_box_and_repeat():
     assert not poses[0].IsNearlyEqualTo(poses[2], 1e-3)
     for X in poses:
         assert np.all((X.translation() >= lower) & (X.translation() <= upper))
+
+
+@pytest.mark.parametrize("steps", [(0.0, 1.0), (1.0, -1.0), (np.nan, 1.0)])
+def test_steps_of_a_line_are_positive(steps):
+    with pytest.raises(ValueError, match="must be positive"):
+        straight_line(RigidTransform(), RigidTransform([1.0, 0.0, 0.0]), *steps)

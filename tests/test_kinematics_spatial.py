@@ -160,3 +160,11 @@ def test_pure_translation():
 def test_other_shapes_are_refused_by_name(shape):
     with pytest.raises(ValueError, match="V_WB_E must be"):
         shift_velocity(np.zeros(shape), np.zeros(3))
+
+
+def test_velocities_of_two_shapes_do_not_compose():
+    with pytest.raises(ValueError, match="one shape"):
+        compose_velocities(np.ones((6, 1)), np.zeros(3), np.ones(6))
+    for call in (exp_se3, velocity_cross):
+        with pytest.raises(ValueError, match=r"must be \(6,\)"):
+            call(np.ones((6, 2)))

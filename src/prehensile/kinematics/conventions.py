@@ -105,7 +105,8 @@ def pose_from_matrix(T: ArrayLike, tolerance: float = 1e-4) -> RigidTransform:
         raise ValueError(f"T must have the last row 0, 0, 0, 1, got {T[3]}")
     error = float(np.linalg.norm(R.T @ R - np.eye(3)))
     if error > tolerance or np.linalg.det(R) < 0.0:
-        raise ValueError(f"T must hold a rotation: |R^T R - I| is {error:.2g}")
+        mirrors = ", and it mirrors" if np.linalg.det(R) < 0.0 else ""
+        raise ValueError(f"T must hold a rotation: |R^T R - I| is {error:.2g}{mirrors}")
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), T[:3, 3])
 
 

@@ -1,7 +1,8 @@
 """What a Jacobian tells about a place: rank, manipulability, how near a singularity is.
 
 A Jacobian J is (m, n): V = J v for joint velocities v (n,) and a task velocity V (m,). The measures
-take any m, and stacks (..., m, n) where they say so.
+take any m, and stacks (..., m, n) where they say so. A J that is not finite or of another shape
+raises ValueError.
 
 Units. The geometric Jacobian of a frame, (6, n), gives three angular velocities (rad/s) and then
 three translational ones (m/s). Singular values, condition number and manipulability of all six
@@ -63,7 +64,7 @@ def singular_values(J: ArrayLike) -> NDArray[np.float64]:
     With n ≥ m, joint velocities of |v| ≤ 1 make a task speed of σ₁ in the best direction and of
     σₘ in the worst.
     """
-    return np.linalg.svd(np.asarray(J, dtype=float), compute_uv=False)
+    return np.asarray(np.linalg.svd(_finite(J), compute_uv=False), dtype=float)
 
 
 def rank(J: ArrayLike, *, tolerance: float | None = None) -> int:
@@ -74,12 +75,18 @@ def rank(J: ArrayLike, *, tolerance: float | None = None) -> int:
         tolerance: a singular value counts as zero if it is at most this share of the largest
             (0..1); default: max(m, n) times the rounding unit 2.2e-16, what rounding in J makes
             of a zero. Take 1e-3, say, to ask for directions of practical use.
+
+    Raises:
+        ValueError: J is no matrix, or the tolerance is out of range.
     """
     J = np.asarray(J, dtype=float)
-    if tolerance is None:
-        tolerance = max(J.shape) * float(np.finfo(float).eps)
+    if J.ndim != 2:
+        raise ValueError(f"J: expected (m, n), not {J.shape}")
+    least = max(J.shape) * float(np.finfo(float).eps) if tolerance is None else tolerance
+    if not 0.0 <= least <= 1.0:
+        raise ValueError(f"tolerance: must be in 0..1, not {tolerance}")
     sigma = singular_values(J)
-    return int(np.count_nonzero(sigma > tolerance * sigma.max(initial=0.0)))
+    return int(np.count_nonzero(sigma > least * sigma.max(initial=0.0)))
 
 
 def condition_number(J: ArrayLike) -> NDArray[np.float64]:
@@ -87,7 +94,7 @@ def condition_number(J: ArrayLike) -> NDArray[np.float64]:
 
     With fewer joints than rows (n < m) it is infinite too. Shape (...).
     """
-    J = np.asarray(J, dtype=float)
+    J = _finite(J)
     sigma = singular_values(J)
     if J.shape[-1] < J.shape[-2]:
         return np.full(sigma.shape[:-1], np.inf)
@@ -102,7 +109,7 @@ def manipulability(J: ArrayLike) -> NDArray[np.float64]:
     Proportional to the volume of the velocity ellipsoid. Shape (...). T. Yoshikawa,
     "Manipulability of Robotic Mechanisms", International Journal of Robotics Research 4(2), 1985.
     """
-    J = np.asarray(J, dtype=float)
+    J = _finite(J)
     sigma = singular_values(J)
     if J.shape[-1] < J.shape[-2]:
         return np.zeros(sigma.shape[:-1])
@@ -209,8 +216,18 @@ def singularity_along(
     return PathSingularity(distances, closest, axes[:, -1])
 
 
+def _finite(J: ArrayLike) -> NDArray[np.float64]:
+    """A matrix or a stack of them, checked."""
+    J = np.asarray(J, dtype=float)
+    if J.ndim < 2 or not np.isfinite(J).all():
+        raise ValueError(f"J: expected finite numbers (..., m, n), got {J}")
+    return J
+
+
 def _per_joint(name: str, values: ArrayLike, J: NDArray[np.float64]) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=float)
+    if J.ndim != 2:
+        raise ValueError(f"J: expected (m, n), not {J.shape}")
     if array.shape != J.shape[1:] or not (np.isfinite(array) & (array > 0)).all():
         raise ValueError(f"{name}: expected {J.shape[1]} positive numbers, got {values}")
     return array
@@ -218,6 +235,7 @@ def _per_joint(name: str, values: ArrayLike, J: NDArray[np.float64]) -> NDArray[
 
 def _principal(J: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Left singular vectors (m, m) of determinant 1 and as many singular values."""
+    J = _finite(J)
     if J.ndim != 2 or J.shape[0] < 1:
         raise ValueError(f"J: expected (m, n), not {J.shape}")
     U, sigma, _ = np.linalg.svd(J)

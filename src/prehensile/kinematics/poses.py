@@ -56,7 +56,12 @@ def straight_line(
     Args:
         max_translation: largest distance between two neighbours (m, > 0).
         max_rotation: largest angle between two neighbours (rad, > 0).
+
+    Raises:
+        ValueError: a distance or an angle that is not positive.
     """
+    if not (max_translation > 0.0 and max_rotation > 0.0):
+        raise ValueError("max_translation, max_rotation: must be positive")
     distance, angle = pose_distance(X_WA, X_WB)
     steps = max(1, int(np.ceil(max(distance / max_translation, angle / max_rotation) - 1e-9)))
     q_A: Quaternion = X_WA.rotation().ToQuaternion()

@@ -119,12 +119,18 @@ def compose_velocities(V_WA_E: Any, p_AB_E: ArrayLike, V_AB_E: Any) -> Array:
     Args:
         V_WA_E: (6,), or a Jacobian (6, n).
         p_AB_E: (3,) from A's origin to B's, in m.
-        V_AB_E: (6,) or (6, n), measured in A.
+        V_AB_E: likewise, measured in A.
 
     Returns:
-        V_WB_E.
+        V_WB_E, of the same shape.
+
+    Raises:
+        ValueError: the two have different shapes.
     """
-    return shift_velocity(V_WA_E, p_AB_E) + coefficients(V_AB_E, "V_AB_E")
+    V, V_AB = shift_velocity(V_WA_E, p_AB_E), coefficients(V_AB_E, "V_AB_E")
+    if V.shape != V_AB.shape:
+        raise ValueError(f"V_WA_E, V_AB_E must have one shape, got {V.shape} and {V_AB.shape}")
+    return V + V_AB
 
 
 def compose_accelerations(
@@ -204,7 +210,7 @@ def velocity_cross(V: Any) -> Array:
         (6, 6); it is the rate of :func:`adjoint` along V. The one for forces is the negative of
         its transpose.
     """
-    V = coefficients(V, "V")
+    V = _single(V, "V")
     ad = np.zeros((6, 6))
     ad[:3, :3] = ad[3:, 3:] = skew(V[:3])
     ad[3:, :3] = skew(V[3:])
@@ -223,7 +229,7 @@ def exp_se3(S: ArrayLike) -> RigidTransform:
         X_AB. From a pose X_WA on, ``X_WA @ exp_se3(S)`` follows a twist expressed in the moving
         frame, ``exp_se3(S) @ X_WA`` one expressed in W at W's origin.
     """
-    S = coefficients(S, "S")
+    S = _single(S, "S")
     return RigidTransform(RotationMatrix(exp_so3(S[:3])), left_jacobian_so3(S[:3]) @ S[3:])
 
 
@@ -235,3 +241,11 @@ def log_se3(X_AB: RigidTransform) -> Array:
     """
     phi = log_so3(X_AB.rotation().matrix())
     return np.concatenate([phi, left_jacobian_inverse_so3(phi) @ X_AB.translation()])
+
+
+def _single(vector: Any, name: str) -> Array:
+    """The numbers of one spatial vector, (6,)."""
+    numbers = coefficients(vector, name)
+    if numbers.ndim != 1:
+        raise ValueError(f"{name} must be (6,), got {numbers.shape}")
+    return numbers
