@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -169,6 +170,28 @@ def test_lines_of_a_chain() -> None:
     assert pytest.approx(X_WG0.GetAsMatrix4()) == lines.X_WG0
 
 
+def test_lines_of_a_joint_that_carries_its_parent() -> None:
+    """Each joint's axis and point are those of the motion that Drake computes."""
+    plant = MultibodyPlant(0.0)
+    ball = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
+    first, second = (plant.AddRigidBody(name, ball).body_frame() for name in ("first", "second"))
+    mount = plant.AddFrame(FixedOffsetFrame("mount", first, X_TG))
+    base = plant.AddFrame(FixedOffsetFrame("base", plant.world_frame(), X_WB))
+    plant.AddJoint(RevoluteJoint("inverse", first, base, [0.6, 0.0, 0.8]))
+    plant.AddJoint(RevoluteJoint("forward", mount, second, [0.0, 1.0, 0.0]))
+    plant.Finalize()
+    lines = arm_lines(plant, second)
+    assert lines.joints == ("inverse", "forward")
+    X_WG0 = RigidTransform(lines.X_WG0)
+    for joint in range(2):
+        q = np.zeros(2)
+        q[plant.GetJointByName(lines.joints[joint]).position_start()] = 0.4
+        (X_WG,) = _poses(plant, second, q[None])
+        R = RotationMatrix(AngleAxis(0.4, lines.axes[joint]))
+        X = RigidTransform(R, lines.points[joint] - R @ lines.points[joint]) @ X_WG0
+        assert X.IsNearlyEqualTo(X_WG, 1e-12)
+
+
 def test_equivalents() -> None:
     plant, frame_G = _arm("ur5e", "base_link", "tool0")
     arm = ur_arm_from_plant(plant, frame_G)
@@ -183,5 +206,8 @@ def test_equivalents() -> None:
     assert (found <= arm.upper).all()
     (X_WG,) = _poses(plant, frame_G, q[None])
     _check(plant, frame_G, found, X_WG)
-    with pytest.raises(ValueError, match="q"):
-        equivalents(arm, np.zeros(7))
+    for bad in (np.zeros(7), np.full(6, np.nan)):
+        with pytest.raises(ValueError, match="^q: "):
+            equivalents(arm, bad)
+    with pytest.raises(ValueError, match="^tolerance: "):
+        ur_arm_from_plant(plant, frame_G, tolerance=float("nan"))

@@ -9,7 +9,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, FrameIndex, JacobianWrtVariable
 
-from prehensile.kinematics.tree import tree_from_plant
+from prehensile.kinematics.tree import joints_that_move, tree_from_plant
 from prehensile.models.registry import list_models, package_map
 
 SHARED = Path(__file__).parents[1].parent / "shared"
@@ -174,3 +174,8 @@ def test_bad_arguments_are_named():
         tree_from_plant(plant, [], joints=[joint], q_locked=np.zeros(3))
     with pytest.raises(ValueError, match="^plant: "):
         tree_from_plant(MultibodyPlant(0.0), [])
+    elsewhere = arm_with_hand().GetFrameByName("iiwa_link_7")
+    with pytest.raises(ValueError, match="^frames: .*another plant"):
+        tree_from_plant(plant, [elsewhere], joints=[joint])
+    with pytest.raises(ValueError, match="^frames: .*another plant"):
+        joints_that_move(plant, elsewhere)

@@ -17,8 +17,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, Joint, RevoluteJoint
+from pydrake.multibody.tree import Frame, RevoluteJoint
 
+from prehensile.kinematics.tree import chain_from_world
 from prehensile.native.analytic_ik import (
     STATUSES,
     ArmAngleChoice,
@@ -79,20 +80,23 @@ def arm_lines(plant: MultibodyPlant, frame_G: Frame) -> ArmLines:
             is arbitrary.
 
     Raises:
-        ValueError: a joint between the world and G is movable and not revolute.
+        ValueError: the plant is not finalized, the frame is another plant's, or a joint between the
+            world and G is movable and not revolute.
     """
-    joints = _movable_joints(plant, frame_G)
+    chain = [(j, outward) for j, outward in chain_from_world(plant, frame_G) if j.num_velocities()]
     context = plant.CreateDefaultContext()
-    for joint in joints:
+    for joint, _ in chain:
         if not isinstance(joint, RevoluteJoint):
             raise ValueError(
                 f"frame_G: joint {joint.name()!r} that carries it is {joint.type_name()}, "
                 "not revolute"
             )
         joint.set_angle(context, 0.0)
+    joints = [joint for joint, _ in chain]
     X_WJ = [joint.frame_on_parent().CalcPoseInWorld(context) for joint in joints]
     directions = [
-        X.rotation() @ joint.revolute_axis() for X, joint in zip(X_WJ, joints, strict=True)
+        X.rotation() @ joint.revolute_axis() * (1.0 if outward else -1.0)
+        for X, (joint, outward) in zip(X_WJ, chain, strict=True)
     ]
     axes = np.array(directions).reshape(-1, 3)
     return ArmLines(
@@ -171,11 +175,13 @@ def equivalents(arm: SrsArm | UrArm | PieperArm, q: ArrayLike) -> NDArray[np.flo
         (M, n) in the order of q, the angles of each ascending lexicographically.
 
     Raises:
-        ValueError: q has another shape.
+        ValueError: q has another shape or is not finite.
     """
     rows = np.atleast_2d(np.asarray(q, dtype=float))
     if rows.ndim != 2 or rows.shape[1] != arm.num_joints:
         raise ValueError(f"q: expected shape (B, {arm.num_joints}), not {np.shape(q)}")
+    if not np.isfinite(rows).all():
+        raise ValueError("q: must be finite")
     lower, upper = arm.lower, arm.upper
     found = [
         values
@@ -194,20 +200,6 @@ def _turns(q: float, lower: float, upper: float) -> Sequence[float]:
 
 
 def _make(kind: type[Arm], lines: ArmLines, tolerance: float) -> Arm:
+    if not tolerance >= 0.0:
+        raise ValueError(f"tolerance: must not be negative, is {tolerance}")
     return kind(lines.axes, lines.points, lines.X_WG0, lines.lower, lines.upper, tolerance)
-
-
-def _movable_joints(plant: MultibodyPlant, frame: Frame) -> list[Joint]:
-    """The joints with degrees of freedom between the world and a frame, from the world."""
-    by_child = {
-        joint.child_body().index(): joint
-        for joint in (plant.get_joint(index) for index in plant.GetJointIndices())
-    }
-    body = frame.body()
-    joints = []
-    while body.index() != plant.world_body().index():
-        joint = by_child[body.index()]
-        if joint.num_velocities() > 0:
-            joints.append(joint)
-        body = joint.parent_body()
-    return joints[::-1]

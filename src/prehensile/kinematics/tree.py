@@ -60,12 +60,11 @@ def tree_from_plant(
             plant's default positions.
 
     Raises:
-        ValueError: naming the argument: the plant is not finalized; a joint is neither revolute nor
-            prismatic, given twice or of another plant; q_locked has another size or is not
-            finite.
+        ValueError: naming the argument: the plant is not finalized; a frame or a joint is of
+            another plant; a joint is neither revolute nor prismatic or given twice;
+            q_locked has another size or is not finite.
     """
-    if not plant.is_finalized():
-        raise ValueError("plant: must be finalized")
+    _check(plant, frames)
     if joints is None:
         joints = [joint for joint in _all_joints(plant) if joint.num_velocities() > 0]
         mend = "; name the joints that move"
@@ -155,15 +154,48 @@ def joints_that_move(plant: MultibodyPlant, frame: Frame) -> list[Joint]:
     Args:
         plant: finalized.
         frame: one of its frames.
+
+    Raises:
+        ValueError: the plant is not finalized, or the frame is another plant's.
     """
+    return [
+        joint
+        for joint, _ in chain_from_world(plant, frame)
+        if isinstance(joint, (RevoluteJoint, PrismaticJoint))
+    ]
+
+
+def chain_from_world(plant: MultibodyPlant, frame: Frame) -> list[tuple[Joint, bool]]:
+    """The joints of every kind between the world and a frame, from the world outward.
+
+    Args:
+        plant: finalized.
+        frame: one of its frames.
+
+    Returns:
+        Each joint, and whether it is its child body that it carries on the way outward; it moves
+        the other way where it carries its parent.
+
+    Raises:
+        ValueError: the plant is not finalized, or the frame is another plant's.
+    """
+    _check(plant, [frame])
     into = {outboard: (joint, inboard) for joint, inboard, outboard in _outward(plant)}
     joints = []
     body = frame.body().index()
     while body in into:
-        joint, body = into[body]
-        if isinstance(joint, (RevoluteJoint, PrismaticJoint)):
-            joints.append(joint)
+        joint, inboard = into[body]
+        joints.append((joint, body == joint.child_body().index()))
+        body = inboard
     return joints[::-1]
+
+
+def _check(plant: MultibodyPlant, frames: Sequence[Frame]) -> None:
+    if not plant.is_finalized():
+        raise ValueError("plant: must be finalized")
+    for frame in frames:
+        if frame.GetParentPlant() is not plant:
+            raise ValueError(f"frames: {frame.name()} is of another plant")
 
 
 def _all_joints(plant: MultibodyPlant) -> list[Joint]:
