@@ -1,15 +1,14 @@
 #include "prehensile/analytic_ik.h"
 
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/tuple.h>
 
-#include <cstring>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
-#include <string>
 #include <tuple>
 
 #include "bindings.h"
+#include "numpy_arrays.h"
 
 namespace nb = nanobind;
 using nb::literals::operator""_a;
@@ -19,219 +18,108 @@ namespace {
 
 constexpr const char* kStatusNames[] = {"solved", "too far", "too near", "limits"};
 
-using Rows3 = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Poses = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>;
-template <typename T>
-using Out = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
+/// Whole turns of more than this cost digits.
+constexpr double kFarthest = 1e6;
 
-/// A view of an object with a buffer, released in the end. Much faster than an ndarray argument.
-class Buffer {
- public:
-  Buffer() = default;
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
-  ~Buffer() {
-    if (held_) PyBuffer_Release(&view_);
-  }
-  /// Whether the object has a buffer of float64 with so many dimensions.
-  bool Open(nb::handle object, int ndim) {
-    if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_STRIDES | PyBUF_FORMAT) != 0) {
-      PyErr_Clear();
-      return false;
+/// q_near, of a shape that has been checked.
+void RequireNear(const ArrayArgument& q_near) {
+  for (const double* x = q_near.data(); x != q_near.end(); ++x) {
+    if (!(std::abs(*x) <= kFarthest)) {
+      throw std::invalid_argument("q_near: must be finite, and within 1e6 rad");
     }
-    held_ = true;
-    return view_.ndim == ndim && view_.format != nullptr && std::strcmp(view_.format, "d") == 0;
   }
-  Py_ssize_t shape(int i) const { return view_.shape[i]; }
-  double at(Py_ssize_t i, Py_ssize_t j = 0) const {
-    const char* p = static_cast<const char*>(view_.buf) + i * view_.strides[0];
-    if (view_.ndim > 1) p += j * view_.strides[1];
-    double value;
-    std::memcpy(&value, p, sizeof(value));
-    return value;
-  }
-
- private:
-  Py_buffer view_{};
-  bool held_ = false;
-};
-
-/// numpy's functions, fetched once.
-struct Numpy {
-  nb::object empty, asarray, float64, uint8;
-  nb::tuple shapes[2][IkSolutions::kMax + 1];  // Of solutions, for 6 and 7 joints.
-  const nb::tuple& shape(int count, int num_joints) const { return shapes[num_joints - 6][count]; }
-  Numpy() {
-    for (int n : {6, 7}) {
-      for (int count = 0; count <= IkSolutions::kMax; ++count) {
-        shapes[n - 6][count] = nb::make_tuple(count, n);
-      }
-    }
-    const nb::module_ numpy = nb::module_::import_("numpy");
-    empty = numpy.attr("empty");
-    asarray = numpy.attr("asarray");
-    float64 = numpy.attr("float64");
-    uint8 = numpy.attr("uint8");
-  }
-  static const Numpy& Get() {
-    static const Numpy* const numpy = new Numpy;  // Lives as long as the process.
-    return *numpy;
-  }
-};
-
-nb::object AsFloat64(nb::handle values) {
-  return Numpy::Get().asarray(values, Numpy::Get().float64);
 }
 
-/// A new array, and a copy of `values` in it.
-template <typename T>
-nb::object MakeArray(const nb::object& shape, const nb::object& dtype, const T* values,
-                     std::size_t count) {
-  PyObject* const args[] = {shape.ptr(), dtype.ptr()};
-  nb::object array =
-      nb::steal(PyObject_Vectorcall(Numpy::Get().empty.ptr(), args, std::size(args), nullptr));
-  if (!array.is_valid()) throw nb::python_error();
-  Py_buffer view;
-  if (PyObject_GetBuffer(array.ptr(), &view, PyBUF_CONTIG) != 0) throw nb::python_error();
-  std::memcpy(view.buf, values, count * sizeof(T));
-  PyBuffer_Release(&view);
-  return array;
-}
-
-/// Reads (4, 4) numbers, or a RigidTransform (anything with GetAsMatrix4), to row-major order.
-std::array<double, 16> ReadMatrix(nb::handle X_WG) {
-  std::array<double, 16> X;
-  const auto read = [&](nb::handle object) {
-    Buffer buffer;
-    if (!buffer.Open(object, 2)) return false;
-    if (buffer.shape(0) != 4 || buffer.shape(1) != 4) return false;
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) X[4 * i + j] = buffer.at(i, j);
-    }
-    return true;
-  };
-  if (read(X_WG)) return X;
-  nb::object matrix = nb::hasattr(X_WG, "GetAsMatrix4") ? X_WG.attr("GetAsMatrix4")()
-                                                        : nb::borrow<nb::object>(X_WG);
-  if (!read(AsFloat64(matrix))) {
-    throw std::invalid_argument("X_WG: expected a RigidTransform or shape (4, 4)");
-  }
-  return X;
-}
-
-/// n numbers; all finite.
-std::array<double, IkSolutions::kMaxJoints> ReadJoints(const char* name, nb::handle values, int n) {
-  std::array<double, IkSolutions::kMaxJoints> q;
-  const auto read = [&](nb::handle object) {
-    Buffer buffer;
-    if (!buffer.Open(object, 1) || buffer.shape(0) != n) return false;
-    for (int i = 0; i < n; ++i) q[i] = buffer.at(i);
-    return true;
-  };
-  if (!read(values) && !read(AsFloat64(values))) {
-    throw std::invalid_argument(std::string(name) + ": expected shape (" + std::to_string(n) +
-                                ",)");
-  }
-  for (int i = 0; i < n; ++i) {
-    if (!(q[i] - q[i] == 0)) throw std::invalid_argument(std::string(name) + ": not finite");
-  }
-  return q;
-}
-
-ArmLines MakeLines(const Rows3& axes, const Rows3& points, nb::handle X_WG0, const Numbers& lower,
-                   const Numbers& upper) {
-  const std::size_t n = axes.shape(0);
-  if (points.shape(0) != n || lower.shape(0) != n || upper.shape(0) != n) {
-    throw std::invalid_argument("axes, points, lower, upper: differ in length");
-  }
-  ArmLines lines;
-  const std::array<double, 16> X = ReadMatrix(X_WG0);
+template <typename Arm>
+void Construct(Arm* arm, nb::handle axes, nb::handle points, nb::handle X_WG0, nb::handle lower,
+               nb::handle upper, double tolerance) {
+  const ArrayArgument axis(axes, "axes"), point(points, "points"), low(lower, "lower"),
+      high(upper, "upper");
+  const PoseArgument X(X_WG0, "X_WG0");
+  axis.RequireShape({-1, 3});
+  const auto n = static_cast<std::ptrdiff_t>(axis.shape(0));
+  point.RequireShape({n, 3});
+  low.RequireShape({n});
+  high.RequireShape({n});
+  ArmLines lines{.lower = {low.data(), low.end()}, .upper = {high.data(), high.end()}};
   lines.X_WG0 = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data());
-  for (std::size_t i = 0; i < n; ++i) {
-    lines.axes.emplace_back(axes(i, 0), axes(i, 1), axes(i, 2));
-    lines.points.emplace_back(points(i, 0), points(i, 1), points(i, 2));
-    lines.lower.push_back(lower(i));
-    lines.upper.push_back(upper(i));
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    lines.axes.emplace_back(axis.data() + 3 * i);
+    lines.points.emplace_back(point.data() + 3 * i);
   }
-  return lines;
+  new (arm) Arm(lines, tolerance);
 }
 
 /// Options of a call for one pose.
-struct Near {
-  std::array<double, IkSolutions::kMaxJoints> q;
-  IkOptions options;
+class Near {
+ public:
   Near(nb::handle q_near, bool limits, int n) {
     options.limits = limits;
     if (q_near.is_none()) return;
-    q = ReadJoints("q_near", q_near, n);
-    options.q_near = q.data();
+    q_.emplace(q_near, "q_near");
+    q_->RequireShape({n});
+    RequireNear(*q_);
+    options.q_near = q_->data();
   }
+  IkOptions options;
+
+ private:
+  std::optional<ArrayArgument> q_;
 };
 
 template <typename Arm, typename Solve>
-nb::tuple Batch(const Arm& arm, const Poses& X_WG, nb::handle q_near, bool limits, int num_threads,
+nb::tuple Batch(const Arm& arm, nb::handle X_WG, nb::handle q_near, bool limits, int num_threads,
                 const Solve& solve) {
-  const std::size_t n = arm.num_joints(), count = X_WG.shape(0);
-  std::optional<nb::ndarray<const double, nb::c_contig, nb::device::cpu>> near;
+  const ArrayArgument poses(X_WG, "X_WG");
+  poses.RequireShape({-1, 4, 4});
+  const std::size_t n = arm.num_joints(), count = poses.shape(0);
+  std::optional<ArrayArgument> near;
   bool near_each = false;
   if (!q_near.is_none()) {
-    near = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(AsFloat64(q_near));
+    near.emplace(q_near, "q_near");
     near_each = near->ndim() == 2;
-    if (near->ndim() < 1 || near->ndim() > 2 || near->shape(near->ndim() - 1) != n ||
-        (near_each && near->shape(0) != count)) {
-      throw std::invalid_argument("q_near: expected shape (n,) or (N, n)");
-    }
-    for (std::size_t i = 0; i < near->size(); ++i) {
-      if (!(near->data()[i] - near->data()[i] == 0)) {
-        throw std::invalid_argument("q_near: not finite");
-      }
-    }
+    const auto rows = static_cast<std::ptrdiff_t>(count), columns = static_cast<std::ptrdiff_t>(n);
+    near_each ? near->RequireShape({rows, columns}) : near->RequireShape({columns});
+    RequireNear(*near);
   }
-  const Numpy& numpy = Numpy::Get();
-  nb::object q = numpy.empty(nb::make_tuple(count, 8, n), numpy.float64);
-  nb::object status = numpy.empty(nb::make_tuple(count), numpy.uint8);
-  const IkBatch batch{.num_poses = static_cast<int>(count),
-                      .X_WG = X_WG.data(),
+  ArrayResult<> q{count, IkSolutions::kMax, n};
+  ArrayResult<std::uint8_t> status{count};
+  const IkBatch batch{.num_poses = count,
+                      .X_WG = poses.data(),
                       .q_near = near ? near->data() : nullptr,
                       .near_each = near_each,
                       .limits = limits,
                       .num_threads = num_threads,
-                      .q = nb::cast<Out<double>>(q).data(),
-                      .status = nb::cast<Out<std::uint8_t>>(status).data()};
+                      .q = q.data(),
+                      .status = status.data()};
   {
     const nb::gil_scoped_release release;
     solve(batch);
   }
-  return nb::make_tuple(q, status);
+  return nb::make_tuple(q.Take(), status.Take());
 }
+
+nb::object Array(const double* values, std::size_t n) { return ArrayResult<>({n}, values).Take(); }
 
 template <typename Arm>
 nb::class_<Arm> BindCommon(nb::module_& m, const char* name, const char* doc) {
   nb::class_<Arm> arm(m, name, doc);
-  arm.def(
-      "__init__",
-      [](Arm* self, const Rows3& axes, const Rows3& points, nb::handle X_WG0, const Numbers& lower,
-         const Numbers& upper, double tolerance) {
-        new (self) Arm(MakeLines(axes, points, X_WG0, lower, upper), tolerance);
-      },
-      "axes"_a, "points"_a, "X_WG0"_a, "lower"_a, "upper"_a, "tolerance"_a = 1e-6);
+  arm.def("__init__", &Construct<Arm>, "axes"_a, "points"_a, "X_WG0"_a, "lower"_a, "upper"_a,
+          "tolerance"_a = 1e-6);
   arm.def(
       "pose",
       [](const Arm& self, nb::handle q) {
-        const auto joints = ReadJoints("q", q, self.num_joints());
-        std::array<double, 16> X;
+        const VectorArgument joints(q, "q", self.num_joints());
+        ArrayResult<> X{4, 4};
         self.Pose(joints.data(), X.data());
-        return MakeArray(nb::make_tuple(4, 4), Numpy::Get().float64, X.data(), 16);
+        return X.Take();
       },
       "q"_a, "Forward kinematics: X_WG, (4, 4), of the configuration q (n,).");
   arm.def_prop_ro("num_joints", &Arm::num_joints);
-  const auto limit = [](const Arm& self, const std::array<double, 8>& values) {
-    return MakeArray(nb::make_tuple(self.num_joints()), Numpy::Get().float64, values.data(),
-                     self.num_joints());
-  };
-  arm.def_prop_ro("lower", [limit](const Arm& self) { return limit(self, self.lower()); });
-  arm.def_prop_ro("upper", [limit](const Arm& self) { return limit(self, self.upper()); });
+  arm.def_prop_ro("lower",
+                  [](const Arm& self) { return Array(self.lower().data(), self.num_joints()); });
+  arm.def_prop_ro("upper",
+                  [](const Arm& self) { return Array(self.upper().data(), self.num_joints()); });
   return arm;
 }
 
@@ -242,8 +130,9 @@ Solutions that coincide at a singular pose are given once.
 
 Args:
     X_WG: RigidTransform or (4, 4).
-    q_near: (n,) each joint's angle is the equivalent, by whole turns, that is nearest to this
-        within the limits; a joint that a singular pose leaves free gets this value. Zeros if None.
+    q_near: (n,) within 1e6 rad; each joint's angle is the equivalent, by whole turns, that is
+        nearest to this within the limits; a joint that a singular pose leaves free gets this value.
+        Zeros if None.
     limits: whether solutions outside the joint limits are left out.
 
 Raises:
@@ -267,7 +156,7 @@ void BindSixJoints(nb::module_& m, const char* name, const char* doc) {
   arm.def(
       "solve",
       [](const Arm& self, nb::handle X_WG, nb::handle q_near, bool limits) {
-        const std::array<double, 16> X = ReadMatrix(X_WG);
+        const PoseArgument X(X_WG, "X_WG");
         const Near near(q_near, limits, 6);
         IkSolutions solutions;
         self.Solve(X.data(), near.options, &solutions);
@@ -276,14 +165,14 @@ void BindSixJoints(nb::module_& m, const char* name, const char* doc) {
       "X_WG"_a, "q_near"_a = nb::none(), "limits"_a = true, kSolveDoc);
   arm.def(
       "solve_batch",
-      [](const Arm& self, const Poses& X_WG, nb::handle q_near, bool limits, int num_threads) {
+      [](const Arm& self, nb::handle X_WG, nb::handle q_near, bool limits, int num_threads) {
         return Batch(self, X_WG, q_near, limits, num_threads,
                      [&](const IkBatch& batch) { self.SolveBatch(batch); });
       },
       "X_WG"_a, "q_near"_a = nb::none(), "limits"_a = true, "num_threads"_a = 1, kBatchDoc);
   arm.def(
       "branch",
-      [](const Arm& self, nb::handle q) { return self.Branch(ReadJoints("q", q, 6).data()); },
+      [](const Arm& self, nb::handle q) { return self.Branch(VectorArgument(q, "q", 6).data()); },
       "q"_a, "The branch of a configuration (6,).");
 }
 
@@ -294,15 +183,18 @@ void BindAnalyticIk(nb::module_& m) {
       .def_prop_ro(
           "q",
           [](const IkSolutions& self) {
-            return MakeArray(Numpy::Get().shape(self.count, self.num_joints), Numpy::Get().float64,
-                             self.q.data(), self.count * self.num_joints);
+            return ArrayResult<>({static_cast<std::size_t>(self.count),
+                                  static_cast<std::size_t>(self.num_joints)},
+                                 self.q.data())
+                .Take();
           },
           "(B, n) a new array, row per solution.")
       .def_prop_ro(
           "branch",
           [](const IkSolutions& self) {
-            return MakeArray(nb::make_tuple(self.count), Numpy::Get().uint8, self.branch.data(),
-                             self.count);
+            return ArrayResult<std::uint8_t>({static_cast<std::size_t>(self.count)},
+                                             self.branch.data())
+                .Take();
           },
           "(B,) uint8 branch of each, ascending: 4 shoulder + 2 elbow + 1 wrist, where each is 0 "
           "or "
@@ -320,7 +212,7 @@ void BindAnalyticIk(nb::module_& m) {
           "q",
           [](const ArmAngleChoice& self) -> nb::object {
             if (self.status != IkStatus::kSolved) return nb::none();
-            return MakeArray(nb::make_tuple(7), Numpy::Get().float64, self.q.data(), 7);
+            return Array(self.q.data(), 7);
           },
           "(7,) configuration; None if there is none.")
       .def_ro("psi", &ArmAngleChoice::psi, "Its arm angle, in [-π, π].")
@@ -381,7 +273,7 @@ limit and singularity avoidance", Mech. Mach. Theory 121, 2018.)")
       .def(
           "solve",
           [](const SrsArm& self, nb::handle X_WG, double psi, nb::handle q_near, bool limits) {
-            const std::array<double, 16> X = ReadMatrix(X_WG);
+            const PoseArgument X(X_WG, "X_WG");
             const Near near(q_near, limits, 7);
             IkSolutions solutions;
             self.Solve(X.data(), psi, near.options, &solutions);
@@ -390,13 +282,12 @@ limit and singularity avoidance", Mech. Mach. Theory 121, 2018.)")
           "X_WG"_a, "psi"_a, "q_near"_a = nb::none(), "limits"_a = true, kSolveDoc)
       .def(
           "solve_batch",
-          [](const SrsArm& self, const Poses& X_WG, const Numbers& psi, nb::handle q_near,
-             bool limits, int num_threads) {
-            if (psi.shape(0) != X_WG.shape(0)) {
-              throw std::invalid_argument("psi: expected one for each pose");
-            }
+          [](const SrsArm& self, nb::handle X_WG, nb::handle psi, nb::handle q_near, bool limits,
+             int num_threads) {
+            const ArrayArgument poses(X_WG, "X_WG"), angles(psi, "psi");
+            angles.RequireShape({static_cast<std::ptrdiff_t>(poses.size() / 16)});
             return Batch(self, X_WG, q_near, limits, num_threads,
-                         [&](const IkBatch& batch) { self.SolveBatch(batch, psi.data()); });
+                         [&](const IkBatch& batch) { self.SolveBatch(batch, angles.data()); });
           },
           "X_WG"_a, "psi"_a, "q_near"_a = nb::none(), "limits"_a = true, "num_threads"_a = 1,
           kBatchDoc)
@@ -404,7 +295,7 @@ limit and singularity avoidance", Mech. Mach. Theory 121, 2018.)")
           "arm_angle",
           [](const SrsArm& self, nb::handle q) {
             int branch = 0;
-            const double psi = self.ArmAngle(ReadJoints("q", q, 7).data(), &branch);
+            const double psi = self.ArmAngle(VectorArgument(q, "q", 7).data(), &branch);
             return std::tuple(psi, branch);
           },
           "q"_a, "Arm angle, in [-π, π], and branch of a configuration (7,).")
@@ -413,9 +304,10 @@ limit and singularity avoidance", Mech. Mach. Theory 121, 2018.)")
           [](const SrsArm& self, nb::handle X_WG, int branch) {
             IkStatus status;
             const AngleIntervals intervals =
-                self.Intervals(ReadMatrix(X_WG).data(), branch, &status);
-            return MakeArray(nb::make_tuple(intervals.count, 2), Numpy::Get().float64,
-                             intervals.bounds[0].data(), 2 * intervals.count);
+                self.Intervals(PoseArgument(X_WG, "X_WG").data(), branch, &status);
+            return ArrayResult<>({static_cast<std::size_t>(intervals.count), 2},
+                                 intervals.bounds[0].data())
+                .Take();
           },
           "X_WG"_a, "branch"_a,
           R"(The arm angles at which a branch reaches the pose within all joint limits.
@@ -429,7 +321,8 @@ Returns:
       .def(
           "closest",
           [](const SrsArm& self, nb::handle X_WG, nb::handle q) {
-            return self.Closest(ReadMatrix(X_WG).data(), ReadJoints("q", q, 7).data());
+            return self.Closest(PoseArgument(X_WG, "X_WG").data(),
+                                VectorArgument(q, "q", 7).data());
           },
           "X_WG"_a, "q"_a,
           R"(Of all branches and arm angles within the limits, the configuration closest to q.
@@ -439,7 +332,7 @@ around the best sample. q also decides what joints do that a singular pose leave
       .def(
           "farthest_from_limits",
           [](const SrsArm& self, nb::handle X_WG) {
-            return self.FarthestFromLimits(ReadMatrix(X_WG).data());
+            return self.FarthestFromLimits(PoseArgument(X_WG, "X_WG").data());
           },
           "X_WG"_a,
           R"(The configuration whose joint nearest to a limit is as far from it as can be.
@@ -448,7 +341,7 @@ Distance as a fraction of half the joint's range; searched as by closest().)")
       .def(
           "widest_interval",
           [](const SrsArm& self, nb::handle X_WG) {
-            return self.WidestInterval(ReadMatrix(X_WG).data());
+            return self.WidestInterval(PoseArgument(X_WG, "X_WG").data());
           },
           "X_WG"_a, R"(The centre of the widest interval of arm angles of all branches.)");
 }

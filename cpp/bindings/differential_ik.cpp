@@ -29,7 +29,7 @@ std::vector<double> Numbers(nb::handle value, const char* name) {
   if (value.is_none()) return {};
   const ArrayArgument array(value, name);
   array.RequireShape({-1});
-  return {array.data(), array.data() + array.size()};
+  return {array.data(), array.end()};
 }
 
 void Construct(DifferentialIk* ik, nb::handle position_lower, nb::handle position_upper,
@@ -184,8 +184,6 @@ IkStep Step(const DifferentialIk& ik, nb::handle q, nb::handle v, nb::handle J, 
   return step;
 }
 
-nb::object StatusArray(ArrayResult&& values) { return values.Take().attr("astype")("int32"); }
-
 nb::tuple StepBatch(const DifferentialIk& ik, nb::handle q, nb::handle v, nb::handle J,
                     nb::handle V, nb::handle weights,
                     const std::optional<std::vector<int>>& level_sizes, nb::handle A,
@@ -194,23 +192,20 @@ nb::tuple StepBatch(const DifferentialIk& ik, nb::handle q, nb::handle v, nb::ha
   const State state(n, q, v, true);
   const Tasks tasks(n, J, V, weights, level_sizes, true, state.N);
   const Constraints constraints(n, A, lower, upper, true, state.N);
-  ArrayResult v_next{state.N, static_cast<std::size_t>(n)};
-  ArrayResult status{state.N};
-  std::vector<std::int32_t> codes(state.N);
-  double* const out = v_next.data();
+  ArrayResult<> v_next{state.N, static_cast<std::size_t>(n)};
+  ArrayResult<std::int32_t> status{state.N};
   {
     const nb::gil_scoped_release release;
-    ik.StepBatch(state.N, state.q.data(), state.v.data(), tasks.rows, constraints.rows, out,
-                 codes.data(), num_threads);
+    ik.StepBatch(state.N, state.q.data(), state.v.data(), tasks.rows, constraints.rows,
+                 v_next.data(), status.data(), num_threads);
   }
-  std::copy(codes.begin(), codes.end(), status.data());
-  return nb::make_tuple(v_next.Take(), StatusArray(std::move(status)));
+  return nb::make_tuple(v_next.Take(), status.Take());
 }
 
 nb::tuple VelocityInterval(const DifferentialIk& ik, nb::handle q, nb::handle v) {
   const int n = ik.num_joints();
   const State state(n, q, v, false);
-  ArrayResult lower{static_cast<std::size_t>(n)}, upper{static_cast<std::size_t>(n)};
+  ArrayResult<> lower{static_cast<std::size_t>(n)}, upper{static_cast<std::size_t>(n)};
   const bool beyond =
       ik.VelocityInterval(state.q.data(), state.v.data(), lower.data(), upper.data());
   return nb::make_tuple(lower.Take(), upper.Take(), beyond);
@@ -227,18 +222,17 @@ void ConstructFrames(FrameIk* frame_ik, const KinematicTree& tree, const Differe
   for (const ArrayArgument* array : {&frame, &own_axes, &level, &gain, &angular, &linear}) {
     array->RequireShape({m});
   }
-  frame.RequireFinite();
-  level.RequireFinite();
+  const std::vector<int> numbers = frame.Integers(), priorities = level.Integers();
   std::vector<FrameTask> tasks(frame.size());
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     FrameTask& task = tasks[i];
-    task.frame = static_cast<int>(frame.data()[i]);
+    task.frame = numbers[i];
     std::copy(weight.data() + 6 * i, weight.data() + 6 * (i + 1), task.weights);
-    task.in_frame = own_axes.data()[i] != 0.0;
-    task.level = static_cast<int>(level.data()[i]);
-    task.gain = gain.data()[i];
-    task.max_angular = angular.data()[i];
-    task.max_linear = linear.data()[i];
+    task.in_frame = own_axes[i] != 0.0;
+    task.level = priorities[i];
+    task.gain = gain[i];
+    task.max_angular = angular[i];
+    task.max_linear = linear[i];
   }
   new (frame_ik) FrameIk(std::make_shared<const KinematicTree>(tree), ik, std::move(tasks));
 }
@@ -273,28 +267,23 @@ nb::tuple Rollout(const FrameIk& ik, nb::handle q, nb::handle v, nb::handle X_WD
   poses.RequireFinite();
   if (steps < 0) throw std::invalid_argument("steps: expected >= 0");
   const auto columns = static_cast<std::size_t>(n);
-  ArrayResult q_end{state.N, columns}, v_end{state.N, columns}, status{state.N};
-  std::copy(state.q.data(), state.q.data() + state.q.size(), q_end.data());
-  std::copy(state.v.data(), state.v.data() + state.v.size(), v_end.data());
-  std::optional<ArrayResult> path;
-  if (keep_path) path.emplace(ArrayResult{state.N, static_cast<std::size_t>(steps), columns});
-  std::vector<std::int32_t> codes(state.N);
+  ArrayResult<> q_end({state.N, columns}, state.q.data()),
+      v_end({state.N, columns}, state.v.data());
+  ArrayResult<std::int32_t> status{state.N};
+  std::optional<ArrayResult<>> path;
+  if (keep_path) path.emplace(ArrayResult<>{state.N, static_cast<std::size_t>(steps), columns});
   {
-    double* const q_data = q_end.data();
-    double* const v_data = v_end.data();
     double* const path_data = path ? path->data() : nullptr;
     const nb::gil_scoped_release release;
-    ik.Rollout(state.N, steps, q_data, v_data, poses.data(), path_data, codes.data(), num_threads);
+    ik.Rollout(state.N, steps, q_end.data(), v_end.data(), poses.data(), path_data, status.data(),
+               num_threads);
   }
-  std::copy(codes.begin(), codes.end(), status.data());
-  return nb::make_tuple(q_end.Take(), v_end.Take(), StatusArray(std::move(status)),
+  return nb::make_tuple(q_end.Take(), v_end.Take(), status.Take(),
                         path ? path->Take() : nb::none());
 }
 
 nb::object Array(const double* values, int n) {
-  ArrayResult array{static_cast<std::size_t>(n)};
-  std::copy(values, values + n, array.data());
-  return array.Take();
+  return ArrayResult<>({static_cast<std::size_t>(n)}, values).Take();
 }
 
 }  // namespace

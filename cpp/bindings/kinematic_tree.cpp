@@ -30,20 +30,17 @@ void Construct(KinematicTree* tree, nb::handle parents, nb::handle X_PJ, nb::han
   slides.RequireShape({n});
   frame_parent.RequireShape({m});
   frame_pose.RequireShape({m, 4, 4});
-  parent.RequireFinite();
-  frame_parent.RequireFinite();
+  const std::vector<int> movers = parent.Integers(), frame_movers = frame_parent.Integers();
   std::vector<TreeJoint> joints;
   for (std::ptrdiff_t i = 0; i < n; ++i) {
-    joints.push_back(
-        {.parent = static_cast<int>(parent.data()[i]),
-         .X_PJ = PoseOf(pose.data() + 16 * i),
-         .axis = Eigen::Vector3d(axis.data() + 3 * i),
-         .type = slides.data()[i] != 0 ? JointType::kPrismatic : JointType::kRevolute});
+    joints.push_back({.parent = movers[i],
+                      .X_PJ = PoseOf(pose.data() + 16 * i),
+                      .axis = Eigen::Vector3d(axis.data() + 3 * i),
+                      .type = slides[i] != 0 ? JointType::kPrismatic : JointType::kRevolute});
   }
   std::vector<TreeFrame> frames;
   for (std::ptrdiff_t i = 0; i < m; ++i) {
-    frames.push_back({.parent = static_cast<int>(frame_parent.data()[i]),
-                      .X_PF = PoseOf(frame_pose.data() + 16 * i)});
+    frames.push_back({.parent = frame_movers[i], .X_PF = PoseOf(frame_pose.data() + 16 * i)});
   }
   new (tree) KinematicTree(joints, frames);
 }
@@ -55,58 +52,49 @@ void RequireFrame(const KinematicTree& tree, int frame, const char* name, int lo
   }
 }
 
-/// One configuration, checked.
-class Configuration : public ArrayArgument {
- public:
-  Configuration(const KinematicTree& tree, nb::handle q) : ArrayArgument(q, "q") {
-    RequireShape({tree.num_joints()});
-    RequireFinite();
-  }
-};
-
 std::size_t Columns(const KinematicTree& tree) {
   return static_cast<std::size_t>(tree.num_joints());
 }
 
 nb::object Pose(const KinematicTree& tree, nb::handle q, int frame) {
-  const Configuration configuration(tree, q);
+  const VectorArgument configuration(q, "q", tree.num_joints());
   RequireFrame(tree, frame, "frame");
-  ArrayResult X{4, 4};
+  ArrayResult<> X{4, 4};
   tree.PoseAndJacobian(configuration.data(), frame, X.data(), nullptr);
   return X.Take();
 }
 
 nb::object Jacobian(const KinematicTree& tree, nb::handle q, int frame) {
-  const Configuration configuration(tree, q);
+  const VectorArgument configuration(q, "q", tree.num_joints());
   RequireFrame(tree, frame, "frame");
-  ArrayResult J{6, Columns(tree)};
+  ArrayResult<> J{6, Columns(tree)};
   tree.PoseAndJacobian(configuration.data(), frame, nullptr, J.data());
   return J.Take();
 }
 
 nb::tuple PoseAndJacobian(const KinematicTree& tree, nb::handle q, int frame) {
-  const Configuration configuration(tree, q);
+  const VectorArgument configuration(q, "q", tree.num_joints());
   RequireFrame(tree, frame, "frame");
-  ArrayResult X{4, 4};
-  ArrayResult J{6, Columns(tree)};
+  ArrayResult<> X{4, 4};
+  ArrayResult<> J{6, Columns(tree)};
   tree.PoseAndJacobian(configuration.data(), frame, X.data(), J.data());
   return nb::make_tuple(X.Take(), J.Take());
 }
 
 nb::object RelativeJacobian(const KinematicTree& tree, nb::handle q, int frame, int measured_in,
                             int expressed_in) {
-  const Configuration configuration(tree, q);
+  const VectorArgument configuration(q, "q", tree.num_joints());
   RequireFrame(tree, frame, "frame");
   RequireFrame(tree, measured_in, "measured_in", -1);
   RequireFrame(tree, expressed_in, "expressed_in", -1);
-  ArrayResult J{6, Columns(tree)};
+  ArrayResult<> J{6, Columns(tree)};
   tree.RelativeJacobian(configuration.data(), frame, measured_in, expressed_in, J.data());
   return J.Take();
 }
 
 /// Poses, Jacobians or both of N configurations, the GIL released.
-void Batch(const KinematicTree& tree, const ArrayArgument& Q, int frame, ArrayResult* X,
-           ArrayResult* J, int num_threads) {
+void Batch(const KinematicTree& tree, const ArrayArgument& Q, int frame, ArrayResult<>* X,
+           ArrayResult<>* J, int num_threads) {
   const std::size_t N = Q.shape(0);
   double* const poses = X ? X->data() : nullptr;
   double* const jacobians = J ? J->data() : nullptr;
@@ -123,7 +111,7 @@ void RequireBatch(const KinematicTree& tree, const ArrayArgument& Q, int frame) 
 nb::object Poses(const KinematicTree& tree, nb::handle q, int frame, int num_threads) {
   const ArrayArgument Q(q, "Q");
   RequireBatch(tree, Q, frame);
-  ArrayResult X{Q.shape(0), 4, 4};
+  ArrayResult<> X{Q.shape(0), 4, 4};
   Batch(tree, Q, frame, &X, nullptr, num_threads);
   return X.Take();
 }
@@ -131,7 +119,7 @@ nb::object Poses(const KinematicTree& tree, nb::handle q, int frame, int num_thr
 nb::object Jacobians(const KinematicTree& tree, nb::handle q, int frame, int num_threads) {
   const ArrayArgument Q(q, "Q");
   RequireBatch(tree, Q, frame);
-  ArrayResult J{Q.shape(0), 6, Columns(tree)};
+  ArrayResult<> J{Q.shape(0), 6, Columns(tree)};
   Batch(tree, Q, frame, nullptr, &J, num_threads);
   return J.Take();
 }

@@ -2,10 +2,12 @@
 // names, defaults and documentation on it that users see.
 
 #include "bindings.h"
+#include "numpy_arrays.h"
 
 NB_MODULE(_core, m) {
   // Drake keeps Systems written in Python, and what they hold, until the process ends.
   nanobind::set_leak_warnings(false);
+  prehensile::NumpyApi::Load();
   prehensile::BindVoxelDownsample(m);
   prehensile::BindKinematicTree(m);
   prehensile::BindReachability(m);

@@ -29,7 +29,7 @@ ReachPart ParsePart(const std::string& name) {
 
 nb::object Sample(const std::vector<double>& lower, const std::vector<double>& upper,
                   std::uint64_t seed, std::uint64_t first, std::size_t count, int num_threads) {
-  ArrayResult Q{count, lower.size()};
+  ArrayResult<> Q{count, lower.size()};
   double* const data = Q.data();
   {
     const nb::gil_scoped_release release;

@@ -111,14 +111,10 @@ void ReadPose(const double* X_WG, Eigen::Matrix3d* R_WG, Eigen::Vector3d* p_WG);
 /// Calls solve(i, options, &solutions) for each pose and writes the results.
 template <typename Solve>
 void RunBatch(const IkBatch& batch, int n, const Solve& solve) {
-  if (batch.num_threads < 1) throw std::invalid_argument("num_threads: must be at least 1");
-  const int num_tasks = std::clamp(batch.num_poses / 64, 1, batch.num_threads);
-  RunParallel(num_tasks, [&](int task) {
-    const auto begin = static_cast<std::int64_t>(batch.num_poses) * task / num_tasks;
-    const auto end = static_cast<std::int64_t>(batch.num_poses) * (task + 1) / num_tasks;
+  RunShares(batch.num_poses, 64, batch.num_threads, [&](std::size_t begin, std::size_t end) {
     IkSolutions solutions;
     IkOptions options{.limits = batch.limits};
-    for (std::int64_t i = begin; i < end; ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
       if (batch.q_near != nullptr) options.q_near = batch.q_near + (batch.near_each ? i * n : 0);
       try {
         solve(i, options, &solutions);

@@ -60,7 +60,8 @@ void RequireWrist(const ArmLines& lines, double tolerance) {
 namespace internal {
 
 IkStatus PlanarElbow::Bend(double distance, Turn* bend) const {
-  if (distance > upper + fore + kReach) return IkStatus::kTooFar;
+  // Written so that NaN is too far: the squares of a pose's coordinates may be infinite.
+  if (!(distance <= upper + fore + kReach)) return IkStatus::kTooFar;
   if (distance < std::abs(upper - fore) - kReach) return IkStatus::kTooNear;
   // By half the angle, which is exact to rounding at the stretched and the folded elbow, too.
   const double sum = upper + fore, difference = upper - fore;
@@ -241,7 +242,7 @@ void UrArm::Solve(const double* X_WG, const IkOptions& options, IkSolutions* out
 }
 
 void UrArm::SolveBatch(const IkBatch& batch) const {
-  internal::RunBatch(batch, n_, [&](std::int64_t i, const IkOptions& options, IkSolutions* out) {
+  internal::RunBatch(batch, n_, [&](std::size_t i, const IkOptions& options, IkSolutions* out) {
     Solve(batch.X_WG + 16 * i, options, out);
   });
 }
@@ -355,7 +356,7 @@ void PieperArm::SolveMeeting(const Vector3d& P, const Matrix3d& R_6, const IkOpt
   const double amplitude = std::hypot(cosine, sine);
   const double bend = (v.squaredNorm() - constant) / amplitude;
   const double slack = 2 * v.norm() * internal::kReach / amplitude;
-  if (std::abs(bend) > 1 + slack) {
+  if (!(std::abs(bend) - slack <= 1)) {
     pattern->failure = bend > 0 ? IkStatus::kTooFar : IkStatus::kTooNear;
     return;
   }
@@ -393,7 +394,7 @@ void PieperArm::SolveMeeting(const Vector3d& P, const Matrix3d& R_6, const IkOpt
 }
 
 void PieperArm::SolveBatch(const IkBatch& batch) const {
-  internal::RunBatch(batch, n_, [&](std::int64_t i, const IkOptions& options, IkSolutions* out) {
+  internal::RunBatch(batch, n_, [&](std::size_t i, const IkOptions& options, IkSolutions* out) {
     Solve(batch.X_WG + 16 * i, options, out);
   });
 }

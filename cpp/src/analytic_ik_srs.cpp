@@ -217,7 +217,7 @@ void SrsArm::Solve(const double* X_WG, double psi, const IkOptions& options,
 }
 
 void SrsArm::SolveBatch(const IkBatch& batch, const double* psi) const {
-  internal::RunBatch(batch, n_, [&](std::int64_t i, const IkOptions& options, IkSolutions* out) {
+  internal::RunBatch(batch, n_, [&](std::size_t i, const IkOptions& options, IkSolutions* out) {
     Solve(batch.X_WG + 16 * i, psi[i], options, out);
   });
 }

@@ -2,29 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 #include "parallel.h"
+#include "vectors.h"
 
 namespace prehensile {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double Dot(const double* a, const double* b, int n) {
-  double sum = 0.0;
-  for (int i = 0; i < n; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-double Norm(const double* a, int n) { return std::sqrt(Dot(a, a, n)); }
-
-void Require(bool condition, const char* message) {
-  if (!condition) throw std::invalid_argument(message);
-}
+using internal::Dot;
+using internal::kInfinity;
+using internal::Norm;
+using internal::Require;
 
 // Rotation vector of R_WD R_WF^T, in W: the turn that takes F to D.
 void RotationVector(const double* X_WF, const double* X_WD, double* w) {
@@ -53,10 +43,10 @@ void RotationVector(const double* X_WF, const double* X_WD, double* w) {
   for (int i = 0; i < 3; ++i) w[i] *= factor;
 }
 
-void Shorten(double* a, int n, double longest) {
-  const double norm = Norm(a, n);
+void Shorten(double* a, double longest) {
+  const double norm = std::hypot(a[0], a[1], a[2]);
   if (norm <= longest) return;
-  for (int i = 0; i < n; ++i) a[i] *= longest / norm;
+  for (int i = 0; i < 3; ++i) a[i] *= longest / norm;
 }
 
 }  // namespace
@@ -108,8 +98,8 @@ void FrameIk::Step(const double* q, const double* v, const double* X_WD, const d
     if (V_WD != nullptr) {
       for (int i = 0; i < 6; ++i) V_F[i] += V_WD[6 * order_[t] + i];
     }
-    Shorten(V_F, 3, task.max_angular);
-    Shorten(V_F + 3, 3, task.max_linear);
+    Shorten(V_F, task.max_angular);
+    Shorten(V_F + 3, task.max_linear);
     for (int i = 0; i < 6; ++i) {
       if (task.weights[i] == 0.0) continue;
       double* const row = J + rows * n;
@@ -134,14 +124,12 @@ void FrameIk::Step(const double* q, const double* v, const double* X_WD, const d
 
 void FrameIk::Rollout(std::size_t N, int steps, double* q, double* v, const double* X_WD,
                       double* path, std::int32_t* worst, int num_threads) const {
-  Require(num_threads >= 1, "num_threads: expected at least 1");
   Require(steps >= 0, "steps: expected >= 0");
   const std::size_t n = num_joints(), poses = 16 * tasks_.size();
   const double h = ik_.options().period;
-  const auto share = std::min<std::size_t>(num_threads, std::max<std::size_t>(N, 1));
-  internal::RunParallel(static_cast<int>(share), [&](int part) {
+  internal::RunShares(N, 1, num_threads, [&](std::size_t begin, std::size_t end) {
     IkStep step;
-    for (std::size_t i = N * part / share; i < N * (part + 1) / share; ++i) {
+    for (std::size_t i = begin; i < end; ++i) {
       double* const q_i = q + i * n;
       double* const v_i = v + i * n;
       worst[i] = 0;

@@ -177,23 +177,15 @@ void KinematicTree::RelativeJacobian(const double* q, int frame, int A, int E, d
 
 void KinematicTree::PosesAndJacobians(const double* Q, std::size_t N, int frame, double* X,
                                       double* J, int num_threads) const {
-  if (num_threads < 1) {
-    throw std::invalid_argument("num_threads: must be at least 1, not " +
-                                std::to_string(num_threads));
-  }
-  constexpr std::size_t kRowsPerThread = 512;
-  const auto num_shares =
-      static_cast<int>(std::clamp<std::size_t>(N / kRowsPerThread, 1, num_threads));
   const auto n = static_cast<std::size_t>(num_joints_);
   const internal::ChainView way = chain(frame);
-  if (way.num_steps > internal::kMostSteps) {
-    for (std::size_t i = 0; i < N; ++i) {
-      PoseAndJacobian(Q + n * i, frame, X ? X + 16 * i : nullptr, J ? J + 6 * n * i : nullptr);
+  internal::RunShares(N, 512, num_threads, [&](std::size_t begin, std::size_t end) {
+    if (way.num_steps > internal::kMostSteps) {
+      for (std::size_t i = begin; i < end; ++i) {
+        PoseAndJacobian(Q + n * i, frame, X ? X + 16 * i : nullptr, J ? J + 6 * n * i : nullptr);
+      }
+      return;
     }
-    return;
-  }
-  internal::RunParallel(num_shares, [&](int share) {
-    const std::size_t begin = N * share / num_shares, end = N * (share + 1) / num_shares;
     internal::LaneRoom room;
     for (std::size_t i = begin; i < end; i += internal::kLanes) {
       const auto count = static_cast<int>(std::min<std::size_t>(end - i, internal::kLanes));

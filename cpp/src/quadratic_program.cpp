@@ -3,21 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
+
+#include "vectors.h"
 
 namespace prehensile {
 namespace {
 
 constexpr int kLeading = LeastSquaresCost::kMaxRows + kMaxQpVariables;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using internal::Clamped;
+using internal::Dot;
+using internal::kInfinity;
+
 // Violation of a constraint, relative to its size, that counts as none.
 constexpr double kTolerance = 1e-12;
-
-double Dot(const double* a, const double* b, int n) {
-  double sum = 0.0;
-  for (int i = 0; i < n; ++i) sum += a[i] * b[i];
-  return sum;
-}
 
 // The reflection I − beta h h^T that takes x to (mu, 0, ..., 0); h replaces x.
 double Householder(double* x, int n, double* mu) {
@@ -196,7 +194,7 @@ QpStatus QpSolver::Solve(LeastSquaresCost& cost, const double* c, const double* 
   }
   const auto clamp = [&] {
     if (lower == nullptr) return;
-    for (int i = 0; i < n; ++i) x[i] = std::min(std::max(x[i], lower[i]), upper[i]);
+    for (int i = 0; i < n; ++i) x[i] = Clamped(x[i], lower[i], upper[i]);
   };
   const int num_bounds = lower != nullptr ? n : 0;
   const int max_iterations = 10 * (n + rows.num) + 20;
@@ -299,8 +297,10 @@ QpStatus QpSolver::Solve(LeastSquaresCost& cost, const double* c, const double* 
       }
     }
   }
+  // Where squares overflow, NaN violates nothing.
+  const bool finite = std::all_of(x, x + n, [](double value) { return std::isfinite(value); });
   clamp();
-  return QpStatus::kOptimal;
+  return finite ? QpStatus::kOptimal : QpStatus::kNoProgress;
 }
 
 int KernelBasis(int num, int n, const double* A, double tolerance, double* Z) {

@@ -14,14 +14,6 @@ namespace {
 
 constexpr std::size_t kRowsPerThread = 1024;
 
-int Shares(std::size_t rows, int num_threads) {
-  if (num_threads < 1) {
-    throw std::invalid_argument("num_threads: must be at least 1, not " +
-                                std::to_string(num_threads));
-  }
-  return static_cast<int>(std::clamp<std::size_t>(rows / kRowsPerThread, 1, num_threads));
-}
-
 constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;
 
 /// The output function of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
@@ -131,10 +123,8 @@ void SampleConfigurations(const std::vector<double>& lower, const std::vector<do
       throw std::invalid_argument("upper: must be finite and not below lower");
     }
   }
-  const int num_shares = Shares(count, num_threads);
   const std::uint64_t start = Mix(seed + kGolden);
-  internal::RunParallel(num_shares, [&](int share) {
-    const std::size_t begin = count * share / num_shares, end = count * (share + 1) / num_shares;
+  internal::RunShares(count, kRowsPerThread, num_threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       for (std::size_t i = 0; i < n; ++i) {
         const std::uint64_t bits = Mix(start + ((first + row) * n + i + 1) * kGolden);
@@ -165,7 +155,7 @@ std::size_t AddToReach(const KinematicTree& tree, const ReachQuery& query, const
       !std::isfinite(1 / voxels.voxel_size)) {
     throw std::invalid_argument("voxel_size: must be positive and finite");
   }
-  const int num_shares = Shares(N, num_threads);
+  const int num_shares = internal::NumShares(N, kRowsPerThread, num_threads);
   const auto size = static_cast<std::size_t>(voxels.shape[0] * voxels.shape[1] * voxels.shape[2]);
 
   // The first share adds to the voxels themselves, every other to some of its own, which know the
@@ -182,7 +172,8 @@ std::size_t AddToReach(const KinematicTree& tree, const ReachQuery& query, const
   const std::vector<double> best_s(voxels.singular_value,
                                    voxels.singular_value + (num_shares > 1 ? size : 0));
   internal::RunParallel(num_shares, [&](int share) {
-    const std::size_t begin = N * share / num_shares, end = N * (share + 1) / num_shares;
+    const std::size_t begin = internal::ShareBegin(N, share, num_shares);
+    const std::size_t end = internal::ShareBegin(N, share + 1, num_shares);
     ReachVoxels mine = voxels;
     if (share > 0) {
       Own& room = own[share - 1];

@@ -157,10 +157,6 @@ VoxelCloud<Scalar> VoxelDownsample(const RowsView<Scalar>& points, double voxel_
     throw std::invalid_argument("normals: " + std::to_string(normals->rows()) + " rows for " +
                                 std::to_string(points.rows()) + " points");
   }
-  if (options.num_threads < 1) {
-    throw std::invalid_argument("num_threads: must be at least 1, not " +
-                                std::to_string(options.num_threads));
-  }
   const SimdLevel level = options.simd.value_or(BestSimdLevel());
   if (!IsAvailable(level)) {
     throw std::invalid_argument("simd: this machine lacks " + std::string(Name(level)));
@@ -172,9 +168,7 @@ VoxelCloud<Scalar> VoxelDownsample(const RowsView<Scalar>& points, double voxel_
 
   const VoxelKernel<Scalar>& kernel = KernelFor<Scalar>(level);
   const Scalar* const normals_data = normals ? normals->data() : nullptr;
-  constexpr std::size_t kPointsPerThread = 16 * 1024;
-  const auto num_shares =
-      static_cast<int>(std::clamp<std::size_t>(n / kPointsPerThread, 1, options.num_threads));
+  const int num_shares = internal::NumShares(n, 16 * 1024, options.num_threads);
 
   std::vector<Share> shares;
   shares.reserve(num_shares);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -49,6 +50,7 @@ struct IkSolutions {
 struct IkOptions {
   /// n values: each joint's angle is the equivalent (by whole turns) nearest to this that is within
   /// the limits, and where a singular pose leaves a joint free it gets this value. Null for zeros.
+  /// Not checked; far from zero it costs digits, as many as it has before the point.
   const double* q_near = nullptr;
   /// Whether solutions outside the joint limits are left out.
   bool limits = true;
@@ -156,7 +158,7 @@ class AnalyticArm {
 
 /// Poses for SolveBatch.
 struct IkBatch {
-  int num_poses;
+  std::size_t num_poses;
   /// (num_poses, 4, 4).
   const double* X_WG;
   /// n values for all poses, or n for each if near_each, or null.
