@@ -106,3 +106,12 @@ def test_as_a_process(folder):
     done = subprocess.run([*command, "--debug"], capture_output=True, text=True, timeout=60)
     assert done.returncode != 0
     assert "Traceback" in done.stderr
+
+
+def test_an_output_that_cannot_be_written_is_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    output = tmp_path / "file" / "tree.svg"
+    assert main(["diagram", "--tree", "wsg50", "-o", str(output)]) == 2
+    error = capsys.readouterr().err
+    assert str(tmp_path / "file") in error
+    assert len(error.splitlines()) == 1

@@ -283,6 +283,9 @@ def test_damaged_files_are_refused(small, tmp_path):
     ("values", "argument"),
     [
         ({"num_samples": 0}, "num_samples"),
+        ({"num_samples": math.nan}, "num_samples"),
+        ({"num_directions": 3.5}, "num_directions"),
+        ({"axis": (0.0, 1.0)}, "axis"),
         ({"voxel_size": 0.0}, "voxel_size"),
         ({"voxel_size": math.nan}, "voxel_size"),
         ({"num_directions": 65}, "num_directions"),
@@ -304,6 +307,14 @@ def test_bad_arguments_are_named(iiwa):
         reachability_map(iiwa, ReachabilityConfig(voxel_size=1e-4))
     with pytest.raises(ValueError, match="^num_threads: "):
         reachability_map(iiwa, num_threads=0)
+    few = ReachabilityConfig(num_samples=10)
+    for kept in (np.ones(3, bool), np.ones(10)):
+        with pytest.raises(ValueError, match="^keep: "):
+            reachability_map(iiwa, few, keep=lambda Q, kept=kept: kept)
+    with pytest.raises(ValueError, match="^p_WPs: "):
+        reachability_map(iiwa, few).elements(np.zeros(6))
+    with pytest.raises(ValueError, match="^count: "):
+        fibonacci_directions(0)
     with pytest.raises(ValueError, match="^upper: "):
         sample_configurations([0.0], [-1.0], 1, seed=0)
 
@@ -334,6 +345,8 @@ def test_command_makes_and_shows_maps(tmp_path: Path, capsys, monkeypatch):
         (["iiwa7", "--threads", "0"], "--threads"),
         (["iiwa7", "-o", "map.txt"], "does not end in .npz"),
         (["nothing.npz"], "no such file"),
+        (["nothing.npz", "--at", "nan", "0"], "--at"),
+        (["iiwa7", "--samples", "10", "-o", f"{__file__}/map.npz"], f"{__file__}"),
         (["iiwa77"], "iiwa7"),
     ],
 )

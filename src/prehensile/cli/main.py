@@ -77,6 +77,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:
         if debug:
             raise
+        if isinstance(error, OSError) and error.filename is not None:
+            print(f"prehensile: {error.filename}: {error.strerror}", file=sys.stderr)
+            return 2
         print(
             f"prehensile: {type(error).__name__}: {error}\n"
             "prehensile: this is unexpected; the same command with --debug shows where it happened",

@@ -86,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
     for option, path, suffix in (("--output", output, ".npz"), ("--picture", args.picture, ".png")):
         if path is not None and Path(path).suffix != suffix:
             raise InputError(Finding(f"{path} does not end in {suffix}", key=option))
+    if not all(map(math.isfinite, args.at)):
+        raise InputError(Finding("must be two numbers in m", key="--at"))
     if source.suffix == ".npz":
         reach = load_map(source)
     else:

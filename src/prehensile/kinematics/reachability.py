@@ -54,14 +54,17 @@ class ReachabilityConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for name in ("num_samples", "num_directions", "seed"):
+            if not isinstance(getattr(self, name), (int, np.integer)):
+                raise ValueError(f"{name}: must be a whole number, not {getattr(self, name)!r}")
         if self.num_samples < 1:
             raise ValueError(f"num_samples: must be at least 1, not {self.num_samples}")
         if not (self.voxel_size > 0 and np.isfinite(self.voxel_size)):
             raise ValueError(f"voxel_size: must be positive and finite, not {self.voxel_size}")
         if not 1 <= self.num_directions <= 64:
             raise ValueError(f"num_directions: must be 1 to 64, not {self.num_directions}")
-        if not 0 < np.linalg.norm(self.axis) < np.inf:
-            raise ValueError(f"axis: must have a length, not {self.axis}")
+        if np.shape(self.axis) != (3,) or not 0 < np.linalg.norm(self.axis) < np.inf:
+            raise ValueError(f"axis: must be three numbers, not all zero, not {self.axis}")
         if self.part not in ("rotational", "translational", "both"):
             raise ValueError(f"part: must be rotational, translational or both, not {self.part}")
         if not (self.length > 0 and np.isfinite(self.length)):
@@ -133,18 +136,25 @@ class ReachabilityMap:
         Returns:
             (N, 3) elements, and (N,) whether the point is within the box of voxels (the element
             is zero where it is not).
+
+        Raises:
+            ValueError: points of another shape.
         """
-        p_WPs = np.asarray(p_WPs, dtype=float).reshape(-1, 3)
+        p_WPs = np.asarray(p_WPs, dtype=float)
+        if p_WPs.ndim != 2 or p_WPs.shape[1] != 3:
+            raise ValueError(f"p_WPs: expected (N, 3), not {p_WPs.shape}")
         at = np.floor(p_WPs * (1.0 / self.voxel_size)) - self.first
         inside: NDArray[np.bool_] = np.all((at >= 0) & (at < self.counts.shape), axis=1)
         return np.where(inside[:, None], at, 0).astype(np.intp), inside
 
 
 def fibonacci_directions(count: int) -> NDArray[np.float64]:
-    """(count, 3) unit vectors spread evenly over the sphere, on a golden spiral about z.
+    """(count, 3) unit vectors spread evenly over the sphere, on a golden spiral about z; count ≥ 1.
 
     Source: R. Swinbank, R. J. Purser, "Fibonacci grids", Q. J. R. Meteorol. Soc. 132, 2006.
     """
+    if count < 1:
+        raise ValueError(f"count: must be at least 1, not {count}")
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     r = np.sqrt(1.0 - z * z)
@@ -174,7 +184,7 @@ def reachability_map(
 
     Raises:
         ValueError: naming the argument: no such frame; a prismatic joint without limits; voxels so
-            small that there would be more than 5e7.
+            small that there would be more than 5e7; ``keep`` answers with something else.
     """
     config = config or ReachabilityConfig()
     tree = compiled.tree
@@ -207,7 +217,10 @@ def reachability_map(
             lower, upper, count, seed=config.seed, first=start, num_threads=num_threads
         )
         if keep is not None:
-            Q = Q[keep(Q)]
+            kept = np.asarray(keep(Q))
+            if kept.shape != (count,) or kept.dtype != bool:
+                raise ValueError(f"keep: gave {kept.dtype} {kept.shape} for {count} configurations")
+            Q = Q[kept]
         num_kept += len(Q)
         outside = add_to_reach(
             tree,

@@ -90,9 +90,11 @@ def plot_slices(
         limits: values at the ends of the colour scale; default: the least and the largest.
 
     Raises:
-        ValueError: values is not three-dimensional.
+        ValueError: values is not three-dimensional, or a cut is not finite.
     """
     values = _box(values)
+    if not np.isfinite(at).all():
+        raise ValueError(f"at: must be finite, not {at}")
     low = np.array(first) * voxel_size
     high = low + np.array(values.shape) * voxel_size
     cut = [
