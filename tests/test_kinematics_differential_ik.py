@@ -19,7 +19,7 @@ from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
 
 from prehensile.kinematics.differential_ik import (
     DifferentialIkConfig,
-    IkStatus,
+    DifferentialIkStatus,
     JointLimits,
     at_most,
     centered,
@@ -145,7 +145,7 @@ def test_direction_is_kept_and_as_much_as_possible_of_it():
         got = direction_preserving(
             J, V, q, np.zeros(7), WIDE, period=H, nominal_position=np.zeros(7), weight=1e4
         )
-        assert got.status == IkStatus.OPTIMAL
+        assert got.status == DifferentialIkStatus.OPTIMAL
         np.testing.assert_allclose(J @ got.v, got.alpha * V, atol=1e-8)
         program = np.hstack([J, -V[:, None]])
         ends = np.append(np.ones(7), 1.0)
@@ -199,7 +199,7 @@ def test_priorities_are_the_cascade_of_programs():
         tasks = [(rng.normal(size=(k, 7)), rng.normal(size=k) * 2) for k in sizes]
         q = rng.uniform(-1, 1, 7)
         got = prioritized(tasks, q, np.zeros(7), WIDE, period=H, nominal_position=np.zeros(7))
-        assert got.status == IkStatus.OPTIMAL
+        assert got.status == DifferentialIkStatus.OPTIMAL
         achieved = []
         for J, V in [*tasks, (np.eye(7), -q)]:
             best = solve(7, [(J, V)], -np.ones(7), np.ones(7), achieved)
@@ -232,7 +232,7 @@ def test_constraints_hold_in_every_formulation():
         direction_preserving(J, V, q, zero, **given_state),
         prioritized([(J[:3], V[:3]), (J[3:], V[3:])], q, zero, **given_state),
     ):
-        assert result.status == IkStatus.OPTIMAL
+        assert result.status == DifferentialIkStatus.OPTIMAL
         assert (rows[:2] @ result.v <= np.array([0.1, 0.2]) + 1e-9).all()
         np.testing.assert_allclose(rows[2] @ result.v, 0, atol=1e-9)
 
@@ -315,7 +315,7 @@ def test_the_tip_slides_along_a_virtual_wall():
         p, J = planar_arm(q)
         wall = virtual_walls([[1.0, 0, 0]], [1.5], p, J, gain=8.0)
         step = limited(J, 5 * (goal - p), q, v, limits, period=h, constraints=wall)
-        assert step.status == IkStatus.OPTIMAL
+        assert step.status == DifferentialIkStatus.OPTIMAL
         v = step.v
         q = q + h * v
         farthest = max(farthest, planar_arm(q)[0][0])
@@ -336,7 +336,7 @@ def test_a_tip_beyond_the_wall_comes_back():
         v = step.v
         q = q + 0.005 * v
     assert planar_arm(q)[0][0] == pytest.approx(1.5, abs=1e-3)
-    assert statuses == {IkStatus.RELAXED, IkStatus.OPTIMAL}
+    assert statuses == {DifferentialIkStatus.RELAXED, DifferentialIkStatus.OPTIMAL}
 
 
 def test_point_jacobian_is_the_velocity_of_the_point():

@@ -11,8 +11,8 @@ from pydrake.systems.analysis import Simulator
 
 from prehensile.kinematics.differential_ik import (
     DifferentialIkConfig,
+    DifferentialIkStatus,
     FrameTask,
-    IkStatus,
     JointLimits,
     virtual_walls,
 )
@@ -84,7 +84,7 @@ def test_it_arrives_within_limits():
     distance, angle = pose_distance(pose(rig.get("position")), goal)
     assert distance < 1e-4
     assert angle < 1e-3
-    assert rig.get("status")[0] == IkStatus.OPTIMAL
+    assert rig.get("status")[0] == DifferentialIkStatus.OPTIMAL
     rig.assert_limits()
 
 
@@ -114,19 +114,19 @@ def test_velocities_are_followed():
 def test_it_slows_down_and_holds_without_a_valid_input():
     rig = Rig()
     rig.run(3)
-    assert rig.get("status")[0] == IkStatus.INVALID
+    assert rig.get("status")[0] == DifferentialIkStatus.INVALID
     np.testing.assert_array_equal(rig.get("position"), Q0)
     rig.fix(f"{HAND}.velocity", np.array([0, 0, 0.5, 0, 0, 0.1]))
     rig.run(60)
-    assert rig.get("status")[0] == IkStatus.OPTIMAL
+    assert rig.get("status")[0] == DifferentialIkStatus.OPTIMAL
     rig.fix(f"{HAND}.velocity", np.full(6, np.nan))
     rig.run(60)
-    assert rig.get("status")[0] == IkStatus.INVALID
+    assert rig.get("status")[0] == DifferentialIkStatus.INVALID
     np.testing.assert_array_equal(rig.get("velocity"), 0)
     rig.assert_limits()
     rig.fix(f"{HAND}.velocity", np.zeros(6))
     rig.run(1)
-    assert rig.get("status")[0] == IkStatus.OPTIMAL
+    assert rig.get("status")[0] == DifferentialIkStatus.OPTIMAL
 
 
 def test_measured_positions_count_if_it_is_no_integrator():
@@ -138,7 +138,7 @@ def test_measured_positions_count_if_it_is_no_integrator():
     assert np.linalg.norm(rig.get("velocity")) > 0.05
     rig.fix("estimated_state", np.full(14, np.nan))
     rig.run(1)
-    assert rig.get("status")[0] == IkStatus.INVALID
+    assert rig.get("status")[0] == DifferentialIkStatus.INVALID
 
 
 def test_the_elbow_moves_below_a_hand_that_stays():

@@ -10,8 +10,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.trajectories import PiecewisePolynomial
 
 from prehensile.errors import InputError
+from prehensile.kinematics.joint_limits import JointLimits
 from prehensile.models.registry import package_map
-from prehensile.planning.arm import JointLimits
 from prehensile.planning.blend import round_corners
 from prehensile.planning.time_optimal import fastest_profile
 from prehensile.planning.trajectory import join_paths, time_parameterize

@@ -121,7 +121,7 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
   step->alpha = 1.0;
   step->iterations = 0;
   const bool beyond = VelocityInterval(q, v, step->lower, step->upper);
-  step->status = beyond ? IkStatus::kRecovering : IkStatus::kOptimal;
+  step->status = beyond ? DifferentialIkStatus::kRecovering : DifferentialIkStatus::kOptimal;
   double v_c[kMaxIkJoints];
   const double* center = nullptr;
   if (options_.centering != IkCentering::kNone) {
@@ -157,7 +157,7 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
     if (constraints.num > 0 && (!solved || relative > kViolation)) {
       solved = LeastSquares(first, constraints, first_center, true, step);
       step->violation = Violation(constraints, step->v, n_, &relative);
-      if (relative > kViolation) step->status = IkStatus::kRelaxed;
+      if (relative > kViolation) step->status = DifferentialIkStatus::kRelaxed;
     }
     if (solved && levels) {
       Priorities(tasks, constraints, center, step);
@@ -168,7 +168,7 @@ void DifferentialIk::Step(const double* q, const double* v, const IkTaskRows& ta
     for (int i = 0; i < n_; ++i) step->v[i] = Clamped(0.0, step->lower[i], step->upper[i]);
     step->alpha = 0.0;
     step->violation = Violation(constraints, step->v, n_, &relative);
-    step->status = IkStatus::kBraking;
+    step->status = DifferentialIkStatus::kBraking;
   }
 }
 

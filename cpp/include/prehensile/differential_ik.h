@@ -71,7 +71,7 @@ struct DifferentialIkOptions {
   double rank_tolerance = 1e-6;
 };
 
-enum class IkStatus {
+enum class DifferentialIkStatus {
   kOptimal = 0,
   /// Optimal, but a joint started beyond its limits, or too fast to stop within them; it comes back
   /// as fast as its limits of acceleration and velocity permit.
@@ -87,7 +87,7 @@ enum class IkStatus {
 /// The next joint velocities, and how they came about.
 struct IkStep {
   int n = 0;
-  IkStatus status = IkStatus::kBraking;
+  DifferentialIkStatus status = DifferentialIkStatus::kBraking;
   /// Of kDirection: the part of V achieved. 1 otherwise.
   double alpha = 1.0;
   /// Greatest violation of a linear constraint.

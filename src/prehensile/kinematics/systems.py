@@ -10,8 +10,8 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from prehensile.kinematics.differential_ik import (
     DifferentialIkConfig,
+    DifferentialIkStatus,
     FrameTask,
-    IkStatus,
     JointLimits,
     LinearConstraints,
     compile_frame_ik,
@@ -36,7 +36,7 @@ class DifferentialInverseKinematics(LeafSystem):
 
         position (n)              commanded positions
         velocity (n)              commanded velocities, that led there within the last period
-        status (1)                an :class:`~prehensile.kinematics.differential_ik.IkStatus`
+        status (1)                a DifferentialIkStatus
         alpha (1)                 part of the desired velocity achieved ("direction")
 
     As an integrator, it reads the estimated state at the start alone and goes on from its own
@@ -96,7 +96,7 @@ class DifferentialInverseKinematics(LeafSystem):
         start = np.zeros(n) if default_position is None else np.array(default_position, float)
         self._q = self._declare("position", start)
         self._v = self._declare("velocity", np.zeros(n))
-        self._status = self._declare("status", np.array([float(IkStatus.OPTIMAL)]))
+        self._status = self._declare("status", np.array([float(DifferentialIkStatus.OPTIMAL)]))
         self._alpha = self._declare("alpha", np.ones(1))
         self.DeclareInitializationDiscreteUpdateEvent(self._initialize)
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._update)
@@ -134,7 +134,7 @@ class DifferentialInverseKinematics(LeafSystem):
         if desired is None:
             lower, upper, _ = self._joint_ik.velocity_interval(q, v)
             v_next = np.clip(0.0, lower, upper)
-            status, alpha = IkStatus.INVALID, 0.0
+            status, alpha = DifferentialIkStatus.INVALID, 0.0
         else:
             rows = () if self._constraints is None else _rows(self._constraints(q))
             step = self._frame_ik.step(q, v, *desired, *rows)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -19,34 +18,9 @@ from pydrake.planning import (
 
 from prehensile.errors import InputError
 from prehensile.kinematics.analytic_ik import analytic_ik
+from prehensile.kinematics.joint_limits import JointLimits
 from prehensile.native.analytic_ik import PieperArm, SrsArm, UrArm
 from prehensile.planning.obstacles import HeightMap, body_points, shape_points
-
-
-@dataclass(frozen=True)
-class JointLimits:
-    """Limits of n joints; each array is (n,).
-
-    Attributes:
-        lower, upper: positions (rad or m).
-        velocity: largest absolute velocity.
-        acceleration: largest absolute acceleration.
-    """
-
-    lower: np.ndarray
-    upper: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-
-    def contain(self, q: np.ndarray, tolerance: float = 0.0) -> bool:
-        """Whether all positions of q, (n,) or (K, n), lie within the limits."""
-        return bool(np.all(q >= self.lower - tolerance) and np.all(q <= self.upper + tolerance))
-
-    def scaled(self, velocity: float, acceleration: float) -> "JointLimits":
-        """The same limits with velocity and acceleration times the given factors."""
-        return JointLimits(
-            self.lower, self.upper, self.velocity * velocity, self.acceleration * acceleration
-        )
 
 
 class ArmModel:

@@ -8,7 +8,7 @@ from pydrake.math import BsplineBasis
 from pydrake.trajectories import BsplineTrajectory
 
 from prehensile.errors import InputError
-from prehensile.planning.arm import JointLimits
+from prehensile.kinematics.joint_limits import JointLimits
 from prehensile.planning.blend import round_corners
 from prehensile.planning.time_optimal import fastest_profile, sample_profile
 

@@ -8,7 +8,7 @@ from pydrake.math import BsplineBasis
 from pydrake.multibody.tree import Joint
 from pydrake.trajectories import BsplineTrajectory
 
-from prehensile.planning.arm import JointLimits
+from prehensile.kinematics.joint_limits import JointLimits
 from prehensile.planning.trajectory import time_parameterize
 from prehensile.station.guard import GuardLimits
 from prehensile.tasks.gallery_robots import Robot, is_free

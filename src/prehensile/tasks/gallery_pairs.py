@@ -11,7 +11,8 @@ from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 
 from prehensile.errors import InputError
-from prehensile.planning.arm import ArmModel, JointLimits
+from prehensile.kinematics.joint_limits import JointLimits
+from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import plan_cartesian
 from prehensile.planning.inverse_kinematics import solve_ik
 from prehensile.planning.trajectory import TimedPath, time_parameterize

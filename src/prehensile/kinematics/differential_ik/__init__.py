@@ -27,14 +27,14 @@ from prehensile.kinematics.differential_ik.formulations import (
     velocity_interval,
     velocity_limited,
 )
-from prehensile.kinematics.differential_ik.limits import JointLimits
-from prehensile.kinematics.differential_ik.result import IkResult, IkStatus
+from prehensile.kinematics.differential_ik.result import DifferentialIkResult, DifferentialIkStatus
+from prehensile.kinematics.joint_limits import JointLimits
 
 __all__ = [
     "DifferentialIkConfig",
+    "DifferentialIkResult",
+    "DifferentialIkStatus",
     "FrameTask",
-    "IkResult",
-    "IkStatus",
     "JointLimits",
     "LinearConstraints",
     "at_most",

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from prehensile.kinematics.differential_ik.limits import JointLimits
+from prehensile.kinematics.joint_limits import JointLimits
 from prehensile.kinematics.tree import PlantTree
 from prehensile.native.differential_ik import DifferentialIk, FrameIk
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from prehensile.kinematics.differential_ik.config import DifferentialIkConfig, compile_ik
 from prehensile.kinematics.differential_ik.constraints import LinearConstraints
-from prehensile.kinematics.differential_ik.limits import JointLimits
-from prehensile.kinematics.differential_ik.result import IkResult, result_of
+from prehensile.kinematics.differential_ik.result import DifferentialIkResult, result_of
+from prehensile.kinematics.joint_limits import JointLimits
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ def damped(J: ArrayLike, V: ArrayLike, *, damping: float, threshold: float | Non
 
 def velocity_limited(
     J: ArrayLike, V: ArrayLike, v_max: ArrayLike, *, constraints: LinearConstraints | None = None
-) -> IkResult:
+) -> DifferentialIkResult:
     """min |J v − V|² subject to |v| ≤ v_max (equation 21).
 
     Where several v do, the shortest (by a regularization of 1e-12 |v|² times the square of J's
@@ -99,7 +99,7 @@ def limited(
     period: float,
     damping: float = 0.0,
     constraints: LinearConstraints | None = None,
-) -> IkResult:
+) -> DifferentialIkResult:
     """min |J v_n − V|² + λ² |v_n|² within limits of position, velocity and acceleration.
 
     Equation 22, of which the constraint q_min ≤ q + h v_n ≤ q_max is made sharper: a joint
@@ -132,7 +132,7 @@ def centered(
     gain: float = 1.0,
     weight: float = 0.01,
     constraints: LinearConstraints | None = None,
-) -> IkResult:
+) -> DifferentialIkResult:
     """min |J v_n − V|² + ε |P (v_n − K (q_0 − q))|², limits as in :func:`limited` (equation 23).
 
     Without active limits the second term does not disturb the first. With active ones it does, by
@@ -172,7 +172,7 @@ def direction_preserving(
     gain: float = 1.0,
     weight: float = 100.0,
     constraints: LinearConstraints | None = None,
-) -> IkResult:
+) -> DifferentialIkResult:
     """max w α − |P (v_n − K (q_0 − q))|² subject to J v_n = α V, 0 ≤ α ≤ 1, and limits (24).
 
     This is the program of Drake's ``DoDifferentialInverseKinematics`` (w = 100, the rows of P there
@@ -217,7 +217,7 @@ def prioritized(
     nominal_position: ArrayLike | None = None,
     gain: float = 1.0,
     constraints: LinearConstraints | None = None,
-) -> IkResult:
+) -> DifferentialIkResult:
     """Lexicographic least squares: level by level min |J_i v_n − V_i|², limits kept at every one.
 
     Level i moves in the common kernel of J_1 … J_{i−1} alone, v = v_{i−1} + Z y, so that what the
@@ -333,7 +333,7 @@ def _step(
     V: Array,
     constraints: LinearConstraints | None,
     level_sizes: list[int] | None = None,
-) -> IkResult:
+) -> DifferentialIkResult:
     ik = compile_ik(config, limits)
     rows = () if constraints is None else (constraints.A, constraints.lower, constraints.upper)
     return result_of(ik.step(q, v, J, V, None, level_sizes, *rows), J, V)

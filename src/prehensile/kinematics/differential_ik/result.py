@@ -11,7 +11,7 @@ from prehensile.native.differential_ik import IkStep
 _AT_LIMIT = 1e-9  # rad/s or m/s
 
 
-class IkStatus(enum.IntEnum):
+class DifferentialIkStatus(enum.IntEnum):
     """How a step came out, from best to worst; every one of them keeps the joints' limits."""
 
     OPTIMAL = 0
@@ -30,7 +30,7 @@ class IkStatus(enum.IntEnum):
 
 
 @dataclass(frozen=True)
-class IkResult:
+class DifferentialIkResult:
     """The next joint velocities, and how they came about.
 
     Attributes:
@@ -44,7 +44,7 @@ class IkResult:
     """
 
     v: NDArray[np.float64]
-    status: IkStatus
+    status: DifferentialIkStatus
     alpha: float
     residual: NDArray[np.float64]
     at_limit: NDArray[np.int8]
@@ -53,12 +53,14 @@ class IkResult:
     @property
     def succeeded(self) -> bool:
         """Whether v is the optimum of what was asked for."""
-        return self.status <= IkStatus.RECOVERING
+        return self.status <= DifferentialIkStatus.RECOVERING
 
 
-def result_of(step: IkStep, J: NDArray[np.float64], V: NDArray[np.float64]) -> IkResult:
+def result_of(step: IkStep, J: NDArray[np.float64], V: NDArray[np.float64]) -> DifferentialIkResult:
     """The result of a compiled step with task rows J v ≈ V."""
     v = step.v
     at_limit = (v >= step.upper - _AT_LIMIT).astype(np.int8)
     at_limit -= v <= step.lower + _AT_LIMIT
-    return IkResult(v, IkStatus(step.status), step.alpha, J @ v - V, at_limit, step.violation)
+    return DifferentialIkResult(
+        v, DifferentialIkStatus(step.status), step.alpha, J @ v - V, at_limit, step.violation
+    )

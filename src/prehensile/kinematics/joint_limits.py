@@ -1,9 +1,9 @@
-"""Limits of joints."""
+"""Limits of position, velocity and acceleration of joints."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from prehensile.kinematics.tree import PlantTree
 
@@ -32,6 +32,17 @@ class JointLimits:
             if array.shape != (n,) or np.isnan(array).any():
                 raise ValueError(f"{name}: expected {n} numbers")
             object.__setattr__(self, name, array)
+
+    def contain(self, q: ArrayLike, tolerance: float = 0.0) -> bool:
+        """Whether all positions of q, (n,) or (K, n), lie within the limits."""
+        q = np.asarray(q, float)
+        return bool(np.all(q >= self.lower - tolerance) and np.all(q <= self.upper + tolerance))
+
+    def scaled(self, velocity: float, acceleration: float) -> "JointLimits":
+        """The same limits with velocity and acceleration times the given factors."""
+        return replace(
+            self, velocity=self.velocity * velocity, acceleration=self.acceleration * acceleration
+        )
 
     @staticmethod
     def unlimited(num_joints: int) -> "JointLimits":
