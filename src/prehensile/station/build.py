@@ -69,9 +69,6 @@ def build(scenario: Scenario, *, meshcat: Meshcat | None = None, hardware: bool 
         )
         for name, config in scenario.model_drivers.items()
     ]
-    for driver, site in drivers:
-        if driver.prepare is not None:
-            driver.prepare(site)
     finalize(scenario, plant)
     for driver, site in drivers:
         driver.simulate(site)

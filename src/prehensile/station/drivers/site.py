@@ -167,13 +167,11 @@ class Driver:
         connect: does the same over LCM for the real robot; returns a measured port of m values
             and the (n, m) matrix that makes the model's n positions of them (None: the driver
             exists in simulation only).
-        prepare: changes the plant before it is finalized, such as the gains of its actuators.
     """
 
     config: type
     simulate: Callable[[Site], None]
     connect: Callable[[Site], tuple[OutputPort, np.ndarray]] | None = None
-    prepare: Callable[[Site], None] | None = None
 
     @property
     def tag(self) -> str:
