@@ -196,4 +196,29 @@ def test_motors_even_out_the_inertia_of_an_arm(iiwa):
 
 def test_configurations_of_another_plant_are_refused(iiwa):
     with pytest.raises(ValueError, match="configurations"):
+        joint_inertia(iiwa, np.empty((0, 7)))
+    with pytest.raises(ValueError, match="configurations"):
         joint_inertia(iiwa, np.zeros(6))
+
+
+def test_bodies_that_float_have_no_random_configuration():
+    plant = MultibodyPlant(0.0)
+    Parser(plant).AddModels(str(find_model("foam_brick").path))
+    plant.Finalize()
+    with pytest.raises(ValueError, match="^plant: "):
+        random_configurations(plant, 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"duration": np.inf}, "duration"),
+        ({"samples": 1}, "samples"),
+        ({"q_start": np.nan}, "q_start"),
+        ({"q_desired": np.nan}, "q_desired"),
+    ],
+)
+def test_simulations_out_of_range_are_named(arguments, name):
+    arguments = {"q_desired": 1.0, **arguments}
+    with pytest.raises(ValueError, match=f"^{name}: "):
+        simulate_pendulum(GEARED, position_control(GEARED, 5.0), **arguments)

@@ -42,7 +42,9 @@ def test_the_target_is_in_the_middle_and_up_is_up():
 
 
 @pytest.mark.parametrize(
-    ("eye", "target"), [([0, 0, 1], [0, 0, 0]), ([1, 1, 1], [1, 1, 1])], ids=["along up", "same"]
+    ("eye", "target"),
+    [([0, 0, 1], [0, 0, 0]), ([1, 1, 1], [1, 1, 1]), ([np.nan, 1, 1], [0, 0, 0])],
+    ids=["along up", "same", "nowhere"],
 )
 def test_there_must_be_a_line_of_sight_that_differs_from_up(eye, target):
     with pytest.raises(ValueError, match="line of sight"):

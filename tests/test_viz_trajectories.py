@@ -155,6 +155,9 @@ def test_joints_are_plotted_as_fractions_of_their_limits():
     assert "free (no limit)" in [line.get_label() for line in velocity.lines]
     dashed = [line.get_ydata()[0] for line in velocity.lines if line.get_linestyle() == "--"]
     assert dashed == [-1.0, 1.0]
+    limits = {"lower": [0, 0, 0], "upper": [1, 1, 1], "velocity": [1, 1, 1], "acceleration": [1, 1]}
+    with pytest.raises(ValueError, match="^acceleration must be"):
+        plot_joint_trajectory(trajectory, ["a", "b", "free"], **limits)
 
 
 def test_path_in_space_has_a_name_for_each_place():

@@ -73,16 +73,15 @@ def joint_inertia(plant: MultibodyPlant, configurations: ArrayLike) -> JointIner
 
     Args:
         plant: a finalized plant.
-        configurations: (K, nq) or (nq,) positions.
+        configurations: (K, nq) or (nq,) positions, K >= 1.
 
     Raises:
         ValueError: the configurations do not fit the plant.
     """
     Q = np.atleast_2d(np.asarray(configurations, float))
-    if Q.ndim != 2 or Q.shape[1] != plant.num_positions() or not np.isfinite(Q).all():
-        raise ValueError(
-            f"configurations: finite of shape (K, {plant.num_positions()}), not {Q.shape}"
-        )
+    nq = plant.num_positions()
+    if Q.ndim != 2 or len(Q) == 0 or Q.shape[1] != nq or not np.isfinite(Q).all():
+        raise ValueError(f"configurations: K >= 1 of {nq} finite numbers, got {Q}")
     context = plant.CreateDefaultContext()
     reflected = reflected_inertia(plant)
     link, coupling = [], []
@@ -108,7 +107,14 @@ def random_configurations(
 
     Returns:
         (K, nq).
+
+    Raises:
+        ValueError: a joint has several degrees of freedom, as that of a body which floats.
     """
+    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+    odd = [joint.name() for joint in joints if joint.num_positions() > 1]
+    if odd:
+        raise ValueError(f"plant: {', '.join(odd)} have more than one degree of freedom")
     lower, upper = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
     lower = np.where(np.isfinite(lower), lower, -np.pi)
     upper = np.where(np.isfinite(upper), upper, np.pi)

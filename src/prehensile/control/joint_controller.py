@@ -100,8 +100,11 @@ def controlled_joints(
         instances: the models.
 
     Raises:
-        ValueError: there is none, or one has more than one degree of freedom.
+        ValueError: the plant is not finalized, there is none, or one has more than one degree of
+            freedom.
     """
+    if not plant.is_finalized():
+        raise ValueError("plant: must be finalized")
     joints = []
     for instance in instances:
         own = [actuator.joint() for actuator in actuators_of(plant, [instance])]

@@ -42,11 +42,15 @@ class GearedPendulum:
 
     def __post_init__(self) -> None:
         for name in ("mass", "length", "gear_ratio"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name}: must be positive, not {getattr(self, name)}")
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ValueError(f"{name}: must be finite and positive, not {getattr(self, name)}")
         for name in ("damping", "rotor_inertia", "rotor_damping"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name}: must not be negative, not {getattr(self, name)}")
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(
+                    f"{name}: must be finite and not negative, not {getattr(self, name)}"
+                )
+        if not np.isfinite(self.gravity):
+            raise ValueError(f"gravity: must be finite, not {self.gravity}")
 
     @property
     def link_inertia(self) -> float:
@@ -137,12 +141,19 @@ def simulate_pendulum(
         samples: number of times in the result, evenly spaced (> 1).
 
     Raises:
-        ValueError: gains of another number of joints, or no duration.
+        ValueError: gains of another number of joints, no duration, fewer than two samples, or
+            angles that are not finite.
     """
     if gains.size != 1:
         raise ValueError(f"gains: of {gains.size} joints, the pendulum has one")
-    if not duration > 0.0:
-        raise ValueError(f"duration: must be positive, not {duration}")
+    if not 0.0 < duration < np.inf:
+        raise ValueError(f"duration: must be finite and positive, not {duration}")
+    if samples < 2:
+        raise ValueError(f"samples: must be at least 2, not {samples}")
+    if not np.isfinite(q_start):
+        raise ValueError(f"q_start: must be finite, not {q_start}")
+    if not callable(q_desired) and not np.isfinite(q_desired):
+        raise ValueError(f"q_desired: must be finite, not {q_desired}")
     target = q_desired if callable(q_desired) else lambda t: q_desired
 
     def torque(t: float, x: NDArray[np.float64]) -> float:

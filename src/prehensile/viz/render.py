@@ -38,8 +38,8 @@ def look_at(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) 
     p_WC = np.asarray(eye, float)
     z = np.asarray(target, float) - p_WC
     x = np.cross(z, np.asarray(up, float))
-    if np.linalg.norm(x) < 1e-9:
-        raise ValueError("eye, target, up: the line of sight must differ from up")
+    if not 1e-9 < np.linalg.norm(x) < np.inf:
+        raise ValueError("eye, target, up: must be finite, and the line of sight differ from up")
     y = np.cross(z, x)
     axes = [axis / np.linalg.norm(axis) for axis in (x, y, z)]
     return RigidTransform(RotationMatrix(np.column_stack(axes)), p_WC)

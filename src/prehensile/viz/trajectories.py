@@ -222,7 +222,19 @@ def plot_joint_trajectory(
 
     Returns:
         A figure of three plots, one above the other.
+
+    Raises:
+        ValueError: names or limits of another number of joints.
     """
+    for name, values in (
+        ("names", names),
+        ("lower", lower),
+        ("upper", upper),
+        ("velocity", velocity),
+        ("acceleration", acceleration),
+    ):
+        if np.shape(values) != (trajectory.rows(),):
+            raise ValueError(f"{name} must be ({trajectory.rows()},), got {np.shape(values)}")
     start, end = trajectory.start_time(), trajectory.end_time()
     times = np.linspace(start, end, 2 * _SAMPLES)
     low, high = np.asarray(lower, float), np.asarray(upper, float)
