@@ -23,6 +23,11 @@ def test_unknown_models_are_named(capsys):
     assert "wsg50" in capsys.readouterr().err
 
 
+def test_a_scene_in_which_nothing_moves_is_refused(capsys):
+    assert main(["demo", "hands", "--models", "suction_cup", "--no-browser"]) == 2
+    assert "nothing moves in suction_cup" in capsys.readouterr().err
+
+
 def test_unknown_controllers_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["demo", "arms", "--controller", "magic"])

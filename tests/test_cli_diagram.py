@@ -59,3 +59,8 @@ def test_clear_errors(
 ) -> None:
     assert main(["diagram", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_tree_has_no_hardware(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diagram", "--tree", "--hardware", "iiwa7"]) == 2
+    assert "--hardware" in capsys.readouterr().err

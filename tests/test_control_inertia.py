@@ -201,12 +201,19 @@ def test_configurations_of_another_plant_are_refused(iiwa):
         joint_inertia(iiwa, np.zeros(6))
 
 
-def test_bodies_that_float_have_no_random_configuration():
+def test_random_configurations_leave_the_base_where_it_is():
+    """A floating arm: its quaternion stays one, its joints get about."""
     plant = MultibodyPlant(0.0)
-    Parser(plant).AddModels(str(find_model("foam_brick").path))
+    Parser(plant).AddModels(str(find_model("iiwa7").path))
     plant.Finalize()
-    with pytest.raises(ValueError, match="^plant: "):
-        random_configurations(plant, 3)
+    Q = random_configurations(plant, 50)
+    assert Q.shape == (50, 14)
+    base = plant.GetJointByName("iiwa_link_0").position_start()
+    np.testing.assert_array_equal(
+        Q[:, base : base + 7], np.tile(plant.GetDefaultPositions()[base : base + 7], (50, 1))
+    )
+    joint = plant.GetJointByName("iiwa_joint_1").position_start()
+    assert np.ptp(Q[:, joint]) > 4.0
 
 
 @pytest.mark.parametrize(

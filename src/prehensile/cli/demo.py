@@ -108,6 +108,8 @@ def _pick_place(args: argparse.Namespace) -> int:
         browser=not args.no_browser,
         out=args.out or Path("prehensile-out/pick-place"),
     )
+    if report.interrupted:
+        return 130
     return 0 if report.success else 1
 
 

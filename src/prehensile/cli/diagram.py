@@ -52,9 +52,12 @@ def _draw_tree(args: argparse.Namespace) -> int:
     from pydrake.multibody.plant import MultibodyPlant
 
     from prehensile.cli.view import find
+    from prehensile.errors import Finding, InputError
     from prehensile.station.robot_plant import add_models, finalize
     from prehensile.viz.kinematic_tree import check_suffix, save_kinematic_tree
 
+    if args.hardware:
+        raise InputError(Finding("does not go with --tree", key="--hardware"))
     path = Path(args.output or f"{Path(args.scenario).stem}.svg")
     check_suffix(path)
     scenario = find(args.scenario)

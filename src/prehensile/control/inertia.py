@@ -101,24 +101,24 @@ def random_configurations(
     """Configurations uniformly within the position limits; ±π where there is no limit.
 
     Args:
-        plant: a finalized plant whose joints have one degree of freedom each.
+        plant: a finalized plant. Joints of several degrees of freedom, as those of bodies that
+            float, stay at their default positions.
         count: K, how many.
         seed: of the choice.
 
     Returns:
         (K, nq).
-
-    Raises:
-        ValueError: a joint has several degrees of freedom, as that of a body which floats.
     """
-    joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
-    odd = [joint.name() for joint in joints if joint.num_positions() > 1]
-    if odd:
-        raise ValueError(f"plant: {', '.join(odd)} have more than one degree of freedom")
     lower, upper = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
     lower = np.where(np.isfinite(lower), lower, -np.pi)
     upper = np.where(np.isfinite(upper), upper, np.pi)
-    return np.random.default_rng(seed).uniform(lower, upper, (count, len(lower)))
+    Q = np.random.default_rng(seed).uniform(lower, upper, (count, len(lower)))
+    default = plant.GetDefaultPositions()
+    for joint in (plant.get_joint(index) for index in plant.GetJointIndices()):
+        if joint.num_positions() > 1:
+            stay = slice(joint.position_start(), joint.position_start() + joint.num_positions())
+            Q[:, stay] = default[stay]
+    return Q
 
 
 def _velocity_names(plant: MultibodyPlant) -> tuple[str, ...]:

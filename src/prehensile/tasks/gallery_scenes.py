@@ -8,6 +8,7 @@ from pydrake.math import RollPitchYaw
 from pydrake.trajectories import Trajectory
 
 from prehensile.control.joint_controller import ControllerKind, actuators_of
+from prehensile.errors import Finding, InputError
 from prehensile.station.scenario_file import loads_scenario
 from prehensile.tasks.gallery import Show, Track
 from prehensile.tasks.gallery_motions import swing, wave
@@ -49,6 +50,9 @@ def _show(
     target: Sequence[float],
 ) -> Show:
     """Robots side by side in a scene of their own."""
+    if not any(robot.joints for robot in robots):
+        names = ", ".join(robot.info.name for robot in robots)
+        raise InputError(Finding(f"nothing moves in {names}", "add a model with a motor"))
     text = scenario_text(robots, controller, "Robots of the gallery side by side.")
     return Show(
         scenario=loads_scenario(text),
