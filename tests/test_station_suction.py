@@ -137,6 +137,22 @@ def test_lifts_a_box_and_lets_it_go(tmp_path):
     assert abs(run.height) < 2e-3
 
 
+def test_lets_go_when_the_vacuum_is_too_weak_for_the_weight(tmp_path):
+    response, weight = 0.2, 0.3 * 9.81
+    run = Run(station(tmp_path, config=f"response: {response}"))
+    run.lift()
+    run.wait(1.0)
+    height = run.height
+    run.vacuum(0.0)
+    falls = response * np.log(holding_force(60e3, 0.016) / weight)  # 0.56 s
+    run.wait(falls - 0.05)
+    assert run.height == pytest.approx(height, abs=1e-3)
+    assert run.value("sealed") == 1.0
+    run.wait(0.3)
+    assert run.height < height - 0.05
+    assert run.value("sealed") == 0.0
+
+
 def test_nothing_is_held_without_vacuum(tmp_path):
     run = Run(station(tmp_path))
     run.vacuum(0.0)

@@ -1,7 +1,8 @@
 """A suction cup in simulation: ``MODEL.vacuum`` draws it, the surface before it may be held.
 
-Ports: input ``MODEL.vacuum`` (1: draw, 0 or unconnected: vent); outputs ``MODEL.sealed`` (1 or 0)
-and ``MODEL.pressure`` (Pa below the atmosphere's).
+Ports: input ``MODEL.vacuum`` (1: draw, 0 or unconnected: vent); outputs ``MODEL.sealed`` (1 while a
+surface closes the cup and there is a vacuum, else 0) and ``MODEL.pressure`` (Pa below the
+atmosphere's).
 
 The cup is sealed when one body's surface lies within reach of the lip all round. The vacuum then
 pulls that body to the cup, and the cup to it, with pressure times area; the lip's contact carries
@@ -27,6 +28,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from prehensile.station.drivers.site import Driver, Site
 
 _RIM_POINTS = 8
+_VENTED = 1e-3  # of the pump's pressure, less than which holds nothing
 
 
 @dc.dataclass
@@ -153,9 +155,11 @@ class SuctionSystem(LeafSystem):
     def _update(self, cup: _Cup, context: Context, values: DiscreteValues) -> None:
         port = self.get_input_port(cup.vacuum)
         drawn = port.HasValue(context) and port.Eval(context)[0] > 0.5
-        body = self._look(cup, context) if drawn else None
-        aim = cup.config.vacuum if body is not None else 0.0
         pressure = self._state(cup, context)[1]
+        # What is left of a vacuum holds on while the cup is vented.
+        draws = drawn or pressure > _VENTED * cup.config.vacuum
+        body = self._look(cup, context) if draws else None
+        aim = cup.config.vacuum if drawn and body is not None else 0.0
         pressure = next_pressure(pressure, aim, cup.config.period, cup.config.response)
         values.set_value(cup.state, [-1.0 if body is None else float(body), pressure])
 
