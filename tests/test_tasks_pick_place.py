@@ -161,3 +161,16 @@ def test_demo_leaves_a_report_and_a_replay(tmp_path):
     assert written["success"] is True
     assert written["worst_brick_error"]["mm"] == pytest.approx(1e3 * report.worst()[0])
     assert (tmp_path / "out" / "replay.html").stat().st_size > 100_000
+
+
+def test_a_brick_in_the_air_is_refused_and_a_pose_that_is_none_is_named(arm):
+    X_WStart, X_WGoal = choose_poses(0)
+    above = RigidTransform(X_WGoal.rotation(), X_WGoal.translation() + [0.0, 0.0, 0.1])
+    for poses, where in (((X_WStart, above), "goal"), ((above, X_WStart), "start")):
+        report = run_pick_place(*poses)
+        assert f"{where}: the brick would hang 100 mm" in report.reason
+        assert report.sim_time == 0.0
+    nowhere = RigidTransform([math.nan, 0.0, 0.0])
+    for poses, name in (((nowhere, X_WGoal), "X_WStart"), ((X_WStart, nowhere), "X_WGoal")):
+        with pytest.raises(ValueError, match=f"^{name}: "):
+            plan_pick_place(arm, *poses)

@@ -46,7 +46,7 @@ def test_taken_port_is_a_clear_error() -> None:
         start_meshcat(port=taken.port())
 
 
-@pytest.mark.parametrize("port", [0, -1, 65536, 80000])
+@pytest.mark.parametrize("port", [0, -1, 80, 65536, 80000])
 def test_impossible_port_is_a_clear_error(port: int) -> None:
     with pytest.raises(InputError, match=f"{port} is not a TCP port"):
         start_meshcat(port=port)

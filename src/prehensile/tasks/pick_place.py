@@ -71,7 +71,13 @@ def plan_pick_place(
 
     Returns:
         The motions, or the reason why there are none.
+
+    Raises:
+        ValueError: a pose is not finite.
     """
+    for name, X_WBrick in (("X_WStart", X_WStart), ("X_WGoal", X_WGoal)):
+        if not np.isfinite(X_WBrick.GetAsMatrix4()).all():
+            raise ValueError(f"{name}: must be finite")
     rng = np.random.default_rng(seed)
     home = arm.q_default
     arm.set_hand_width(OPEN_WIDTH)

@@ -33,6 +33,7 @@ from prehensile.tasks.pick_place import (
 POSITION_TOLERANCE = 0.01  # m, of the brick
 ANGLE_TOLERANCE = math.radians(3.0)
 
+_AFLOAT = 0.01  # m over the table from which the brick counts as hanging in the air
 _STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C
 
 
@@ -116,6 +117,12 @@ class PickPlaceReport:
         }
 
 
+def _height(X_WBrick: RigidTransform) -> float:
+    """Height of the brick's lowest corner over the table in m."""
+    reach = np.abs(X_WBrick.rotation().matrix()[2]) @ BRICK_SIZE
+    return float(X_WBrick.translation()[2] - 0.5 * reach)
+
+
 def run_pick_place(
     X_WStart: RigidTransform,
     X_WGoal: RigidTransform,
@@ -133,8 +140,8 @@ def run_pick_place(
     their turn comes, from where the brick then is.
 
     Args:
-        X_WStart: pose of the brick.
-        X_WGoal: pose that it is to have.
+        X_WStart: pose of the brick, on the table (z = 0).
+        X_WGoal: pose that it is to have, likewise.
         trips: how often it is carried: to the goal, back to the start, to the goal ...
         seed: of every random choice.
         meshcat: where to show it; nothing is shown if None.
@@ -145,7 +152,7 @@ def run_pick_place(
         The report; Ctrl-C ends the simulation and leaves the report of what was.
 
     Raises:
-        ValueError: fewer than one trip.
+        ValueError: fewer than one trip, or a pose that is not finite.
     """
     if trips < 1:
         raise ValueError(f"trips must be at least 1, not {trips}")
@@ -153,6 +160,9 @@ def run_pick_place(
     arm = ArmModel(make_robot_diagram(scenario))
     started = time.perf_counter()
     reason = plan_pick_place(arm, X_WStart, X_WGoal, seed=seed).reason
+    for where, X_WBrick in (("start", X_WStart), ("goal", X_WGoal)):
+        if not reason and (height := _height(X_WBrick)) > _AFLOAT:
+            reason = f"{where}: the brick would hang {1e3 * height:.0f} mm over the table"
     plan_time = time.perf_counter() - started
     if not reason and trips > 1:
         reason = plan_pick_place(arm, X_WGoal, X_WStart, seed=seed + 1).reason

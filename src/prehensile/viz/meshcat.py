@@ -19,7 +19,7 @@ def start_meshcat(*, port: int | None = None, open_browser: bool = False) -> Mes
     """Starts a Meshcat server on the loopback interface.
 
     Args:
-        port: TCP port to listen on, 1 to 65535; default: the first free one from 7000 on.
+        port: TCP port to listen on, 1024 to 65535; default: the first free one from 7000 on.
         open_browser: also open the page in the user's browser. A machine without a browser is
             no error: the address can be read from ``meshcat.web_url()``.
 
@@ -29,7 +29,7 @@ def start_meshcat(*, port: int | None = None, open_browser: bool = False) -> Mes
     Raises:
         InputError: the port is out of range or taken, or no port is free.
     """
-    if port is not None and not 1 <= port <= 65535:
+    if port is not None and not 1024 <= port <= 65535:  # Drake ends the process below
         raise InputError(Finding(f"{port} is not a TCP port", "take one from 1024 to 65535"))
     try:
         meshcat = Meshcat(
