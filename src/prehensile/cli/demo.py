@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_common(bimanual)
     bimanual.set_defaults(start=_bimanual)
     iiwa_allegro = demos.add_parser(
-        "iiwa-allegro", help="an arm with a hand of four fingers, which closes and opens"
+        "iiwa-allegro", help="an arm whose hand of four fingers lifts a can"
     )
     _add_common(iiwa_allegro)
     iiwa_allegro.set_defaults(start=_iiwa_allegro)

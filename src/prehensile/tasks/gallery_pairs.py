@@ -1,11 +1,11 @@
-"""Two robots at work together: two arms that lift a box, and an arm with a hand of many joints."""
+"""Two robots at work together: two arms that lift a box, an arm and a hand that grasp a can."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.geometry import Box
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.geometry import Box, Cylinder
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
@@ -37,6 +37,21 @@ _LIFT = 0.2  # m
 _SHIFT = (0.12, 0.0, 0.05)  # m, the farthest that the box is carried
 _PITCH = 0.35  # rad that it is tipped
 _SPEED = 0.3  # of the velocity and acceleration limits while the box is held
+
+CAN_SIZE = (0.0366, 0.2494)
+"""Radius and height of the chips can, in m."""
+
+OPEN = np.zeros(16) + 0.3 * (np.arange(16) == 12)
+"""Joint angles of the Allegro hand with straight fingers, in rad."""
+
+GRASP = np.array([0.0, 1.14, 0.93, 0.90] * 3 + [0.95, 0.3, 0.3, 0.5])
+"""Joint angles that the Allegro hand is sent to around the can, in rad: more than it gets to."""
+
+_P_HCAN = np.array([0.053, 0.0, 0.078])  # m, the can's middle in the frame of the open hand
+_BESIDE = (-0.05, -0.2, 0.0)  # m, where the hand is before it approaches the can
+_ASIDE = (-0.1, 0.25, 0.1)  # m, where the can is carried from where it was lifted to
+_YAW = 0.6  # rad that it is turned there
+_GRASPING = 0.8  # s that the hand is given to close or open
 
 
 def bimanual() -> Show:
@@ -104,10 +119,13 @@ def bimanual() -> Show:
 
 
 def iiwa_allegro() -> Show:
-    """An arm traces a square with a hand of sixteen joints, which closes and opens on the way.
+    """An arm reaches for a can, its hand of sixteen joints grasps it, carries it and puts it back.
+
+    The fingers wrap the can and press it into the palm: they are sent a little further than the
+    can lets them, and what holds it is friction.
 
     Raises:
-        InputError: the square leaves the arm's workspace.
+        InputError: the motion leaves the arm's workspace or meets the can.
     """
     scenario = load_scenario("iiwa_allegro")
     arm = ArmModel(
@@ -115,44 +133,55 @@ def iiwa_allegro() -> Show:
         hand="allegro",
         gripper_frame="hand_root",
     )
-    X_WH = arm.pose(arm.q_default)
-    corners = [(0.0, 0.2, 0.0), (0.0, 0.2, 0.15), (0.0, -0.2, 0.15), (0.0, -0.2, 0.0), (0, 0, 0)]
-    turns = [(0.0, 0.0, 0.3), (0.3, 0.0, 0.3), (-0.3, 0.0, -0.3), (0.0, 0.0, -0.3), (0, 0, 0)]
+    p_WCan = np.array([0.65, 0.0, 0.5 * CAN_SIZE[1]])
+    # Fingers to the front, the thumb on top, the palm to the left.
+    R_WH = RotationMatrix(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+
+    def hand(p_CanMoved_W: ArrayLike, yaw: float = 0.0) -> RigidTransform:
+        """The hand at the can when that is moved and turned."""
+        R_WHMoved = RotationMatrix.MakeZRotation(yaw) @ R_WH
+        return RigidTransform(R_WHMoved, p_WCan + np.asarray(p_CanMoved_W) - R_WHMoved @ _P_HCAN)
+
+    before, home = hand(_BESIDE), arm.q_default
+    arm.set_obstacles([(Cylinder(*CAN_SIZE), RigidTransform(p_WCan))])
+    found = solve_ik(arm, before, home)
+    if not found.solved:
+        raise InputError(f"the hand cannot reach the can: {found.reason}")
+    if not arm.edge_is_free(home, found.q):
+        raise InputError("the arm meets the can on its way")
+    arm.set_obstacles([])
+    up = np.array([0.0, 0.0, _LIFT])
     way = [
-        RigidTransform(
-            RollPitchYaw(np.array(turn)).ToRotationMatrix() @ X_WH.rotation(),
-            X_WH.translation() + corner,
-        )
-        for corner, turn in zip(corners, turns, strict=True)
+        hand(np.zeros(3)),
+        hand(up),
+        hand(up + _ASIDE, _YAW),
+        hand(up),
+        hand(np.zeros(3)),
+        before,
     ]
-    lines = [
-        time_parameterize(line, arm.limits.scaled(0.4, 0.4))
-        for line in _lines(arm, arm.q_default, way)
-    ]
-    samples = _samples([HOLD, *lines], arm.q_default)
-    duration = COMMAND_PERIOD * (len(samples) - 1)
+    approach, *carried, retreat = (
+        time_parameterize(line, arm.limits.scaled(0.4, 0.4)) for line in _lines(arm, found.q, way)
+    )
+    reach = time_parameterize(np.array([home, found.q]), arm.limits.scaled(0.6, 0.6))
+    back = time_parameterize(np.array([retreat.q_end, home]), arm.limits.scaled(0.6, 0.6))
+    parts = [HOLD, reach, approach]
+    closes = COMMAND_PERIOD * (len(_samples(parts, home)) - 1)
+    parts += [_GRASPING, *carried]
+    opens = COMMAND_PERIOD * (len(_samples(parts, home)) - 1)
+    fingers = PiecewisePolynomial.CubicShapePreserving(
+        [0.0, closes, closes + 0.9 * _GRASPING, opens, opens + 0.9 * _GRASPING],
+        np.array([OPEN, OPEN, GRASP, GRASP, OPEN]).T,
+        zero_end_point_derivatives=True,
+    )
+    samples = _samples([*parts, _GRASPING, retreat, back], home)
     return Show(
         scenario,
-        [Track("iiwa", _held(samples)), Track("allegro", _grasps(duration))],
-        (1.05, 0.5, 0.7),
-        (0.35, 0.0, 0.33),
+        [Track("iiwa", _held(samples)), Track("allegro", fingers, start=closes)],
+        (1.7, 0.9, 0.8),
+        (0.4, 0.0, 0.3),
         controller="IiwaDriver and JointStiffnessDriver",
+        measure=lambda plant, context: _raised(plant, context, "chips_can", "can"),
     )
-
-
-OPEN = np.zeros(16) + 0.3 * (np.arange(16) == 12)
-"""Joint angles of the Allegro hand with straight fingers, in rad."""
-
-CLOSED = np.array([0.0, 1.2, 1.0, 0.8] * 3 + [1.0, 0.3, 0.3, 0.5])
-"""Joint angles of the Allegro hand with bent fingers and the thumb across, in rad."""
-
-
-def _grasps(duration: float) -> PiecewisePolynomial:
-    """The hand closes and opens twice within a time."""
-    times = np.concatenate([[0.0], np.linspace(HOLD, duration, 5)])
-    shut = np.array([0.0, 0.0, 1.0, 0.0, 1.0, 0.0])
-    rows = OPEN + shut[:, None] * (CLOSED - OPEN)
-    return PiecewisePolynomial.CubicShapePreserving(times, rows.T, zero_end_point_derivatives=True)
 
 
 def _lines(
@@ -196,8 +225,6 @@ def _jaw_limits() -> JointLimits:
 
 def _lifted(plant: MultibodyPlant, context: Context) -> Mapping[str, float]:
     """How high the box is above the table and how far from being between the hands."""
-    box = plant.GetBodyByName("base_link", plant.GetModelInstanceByName("cracker_box"))
-    X_WBox = plant.EvalBodyPoseInWorld(context, box)
     hands = [
         plant.EvalBodyPoseInWorld(
             context, plant.GetBodyByName("body", plant.GetModelInstanceByName(name))
@@ -205,8 +232,19 @@ def _lifted(plant: MultibodyPlant, context: Context) -> Mapping[str, float]:
         for name in ("wsg_left", "wsg_right")
     ]
     left, right = (X_WG.translation() for X_WG in hands)
+    asymmetry = float(np.linalg.norm(left - right * [1.0, -1.0, 1.0]))
     return {
-        "height of the box's middle, m": float(X_WBox.translation()[2]),
-        "tip of the box, rad": float(np.arccos(np.clip(X_WBox.rotation().matrix()[2, 2], -1, 1))),
-        "asymmetry of the hands, m": float(np.linalg.norm(left - right * [1.0, -1.0, 1.0])),
+        **_raised(plant, context, "cracker_box", "box"),
+        "asymmetry of the hands, m": asymmetry,
+    }
+
+
+def _raised(plant: MultibodyPlant, context: Context, model: str, name: str) -> dict[str, float]:
+    """How high an object that stood upright is above the table, and how far it is tipped."""
+    body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName(model))
+    X_WO = plant.EvalBodyPoseInWorld(context, body)
+    upright = np.clip(X_WO.rotation().matrix()[2, 2], -1.0, 1.0)
+    return {
+        f"height of the {name}'s middle, m": float(X_WO.translation()[2]),
+        f"tip of the {name}, rad": float(np.arccos(upright)),
     }
