@@ -76,7 +76,7 @@ def touches():
 
 
 closes = tracks["allegro"].start
-grasped, end = closes + 0.8, closes + 1.7
+grasped, end = closes + 0.8, closes + 1.4
 shots = [0.0, closes, grasped, end]
 view = look_at([1.6, 0.75, 0.75], [0.45, 0.0, 0.28])
 times, commanded, measured, arm_errors, cans, p_HTips, pictures = [], [], [], [], [], [], []
@@ -188,7 +188,7 @@ print(f"lifted by {100 * height.max():.1f} cm, slipped by "
       f"{1e3 * np.ptp(cans[up, 3:], axis=0).max():.2f} mm")  # fmt: skip
 print(f"pushed up by {push.mean():.2f} N, weight {weight:.2f} N")
 print(f"impulse {impulse:.3f} N s, weight and momentum take {needed:.3f} N s")
-assert height.max() > 0.15
+assert height.max() > 0.08
 assert np.all(pushes[times < closes, 0] == 0)
 assert np.all(count >= 4)
 np.testing.assert_allclose(impulse, needed, rtol=0.01)
