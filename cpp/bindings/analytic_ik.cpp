@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <tuple>
 
 #include "bindings.h"
@@ -21,11 +22,11 @@ constexpr const char* kStatusNames[] = {"solved", "too far", "too near", "limits
 /// Whole turns of more than this cost digits.
 constexpr double kFarthest = 1e6;
 
-/// q_near, of a shape that has been checked.
-void RequireNear(const ArrayArgument& q_near) {
-  for (const double* x = q_near.data(); x != q_near.end(); ++x) {
+/// Angles that others are to be near to.
+void RequireNear(const ArrayArgument& q, const std::string& name) {
+  for (const double* x = q.data(); x != q.end(); ++x) {
     if (!(std::abs(*x) <= kFarthest)) {
-      throw std::invalid_argument("q_near: must be finite, and within 1e6 rad");
+      throw std::invalid_argument(name + ": must be finite, and within 1e6 rad");
     }
   }
 }
@@ -58,7 +59,7 @@ class Near {
     if (q_near.is_none()) return;
     q_.emplace(q_near, "q_near");
     q_->RequireShape({n});
-    RequireNear(*q_);
+    RequireNear(*q_, "q_near");
     options.q_near = q_->data();
   }
   IkOptions options;
@@ -80,7 +81,7 @@ nb::tuple Batch(const Arm& arm, nb::handle X_WG, nb::handle q_near, bool limits,
     near_each = near->ndim() == 2;
     const auto rows = static_cast<std::ptrdiff_t>(count), columns = static_cast<std::ptrdiff_t>(n);
     near_each ? near->RequireShape({rows, columns}) : near->RequireShape({columns});
-    RequireNear(*near);
+    RequireNear(*near, "q_near");
   }
   ArrayResult<> q{count, IkSolutions::kMax, n};
   ArrayResult<std::uint8_t> status{count};
@@ -321,8 +322,9 @@ Returns:
       .def(
           "closest",
           [](const SrsArm& self, nb::handle X_WG, nb::handle q) {
-            return self.Closest(PoseArgument(X_WG, "X_WG").data(),
-                                VectorArgument(q, "q", 7).data());
+            const VectorArgument joints(q, "q", 7);
+            RequireNear(joints, "q");
+            return self.Closest(PoseArgument(X_WG, "X_WG").data(), joints.data());
           },
           "X_WG"_a, "q"_a,
           R"(Of all branches and arm angles within the limits, the configuration closest to q.

@@ -1,4 +1,4 @@
-// What the arms of analytic_ik_srs.cpp and analytic_ik_six.cpp have in common.
+// What the arms of analytic_ik_*.cpp have in common.
 
 #include "prehensile/analytic_ik.h"
 
@@ -84,6 +84,11 @@ void RequireThrough(const ArmLines& lines, int i, const Eigen::Vector3d& point,
     throw std::invalid_argument("lines: axis " + std::to_string(i) + " does not pass through " +
                                 name + " (" + std::to_string(gap) + " m away)");
   }
+}
+
+void RequireWrist(const ArmLines& lines, double tolerance) {
+  RequirePerpendicular(lines, 4, 5, tolerance);
+  RequirePerpendicular(lines, 5, 6, tolerance);
 }
 
 void ReadPose(const double* X, Eigen::Matrix3d* R_WG, Eigen::Vector3d* p_WG) {

@@ -35,6 +35,9 @@ inline constexpr double kReach = 1e-10;
 /// Squares of sines below this are rounding.
 inline constexpr double kRounding = 2e-14;
 
+/// Bits of a branch.
+inline constexpr int kShoulder = 4, kElbow = 2, kWrist = 1;
+
 inline Turn TurnBy(double angle) { return {std::cos(angle), std::sin(angle)}; }
 inline Turn operator+(const Turn& a, const Turn& b) {
   return {a.c * b.c - a.s * b.s, a.s * b.c + a.c * b.s};
@@ -46,6 +49,19 @@ inline Turn Normalized(const Turn& a) {
   return {a.c / length, a.s / length};
 }
 inline Turn Opposite(const Turn& a) { return {-a.c, -a.s}; }
+
+/// Ry(turn)ᵀ M.
+inline Eigen::Matrix3d BackAboutY(const Turn& turn, const Eigen::Matrix3d& M) {
+  Eigen::Matrix3d out;
+  out.row(0) = turn.c * M.row(0) - turn.s * M.row(2);
+  out.row(1) = M.row(1);
+  out.row(2) = turn.s * M.row(0) + turn.c * M.row(2);
+  return out;
+}
+
+inline bool IsNegative(double sign, double offset, double q) {
+  return std::sin(sign * q + offset) < 0;
+}
 
 /// Z = Rz(first) Ry(middle) Rz(last) with the sine of the middle angle >= 0. The other solution has
 /// the opposite first and last turn and the negative middle one.
@@ -99,6 +115,9 @@ Eigen::Vector3d RequireMeeting(const ArmLines& lines, int i, int j, double toler
 void RequireThrough(const ArmLines& lines, int i, const Eigen::Vector3d& point,
                     const std::string& name, double tolerance);
 bool AreParallel(const ArmLines& lines, int i, int j, double tolerance);
+
+/// Axis 4 ⊥ axis 5 ⊥ axis 6.
+void RequireWrist(const ArmLines& lines, double tolerance);
 
 /// The shoulder that carries a point P; the angles of joints 2 and 3 are upper_angle and bend_angle
 /// at q = 0. Checks the axes of joints 1 to 3.

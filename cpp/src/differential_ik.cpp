@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "parallel.h"
@@ -45,7 +46,7 @@ double Violation(const LinearRows& rows, const double* v, int n, double* relativ
 double BrakeSpeed(double room, double acceleration, double period) {
   const double size = std::abs(room);
   if (size == kInfinity) return room;
-  double speed = size / period;
+  double speed = std::min(size / period, std::numeric_limits<double>::max());
   const double change = acceleration * period;
   if (speed > change) {
     // One period at v, then slower by `change` each, takes h ((n + 1) v − change n (n + 1) / 2)

@@ -1,10 +1,8 @@
-// Uses prehensile::core as a C++ program would: no Python, no Drake. Prints what failed, and exits
-// with the number of failures.
+// Uses prehensile::core as a C++ program would: no Python, no Drake.
 
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <limits>
 #include <map>
 #include <random>
@@ -12,28 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "check.h"
 #include "prehensile/voxel_downsample.h"
 
 namespace prehensile {
 namespace {
-
-int failures = 0;
-
-void Check(bool condition, const std::string& what) {
-  if (condition) return;
-  std::printf("FAILED: %s\n", what.c_str());
-  ++failures;
-}
-
-void CheckThrows(const std::string& argument, const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    Check(std::string(error.what()).starts_with(argument + ":"), "names the argument " + argument);
-    return;
-  }
-  Check(false, "throws for " + argument);
-}
 
 template <typename Scalar>
 RowsView<Scalar> View(const std::vector<Scalar>& rows) {

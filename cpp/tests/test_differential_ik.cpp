@@ -1,14 +1,14 @@
 // Differential inverse kinematics as a C++ program uses it, at the greatest sizes there are. Meant
-// to run with sanitizers as well. Prints what failed, and exits with the number of failures.
+// to run with sanitizers as well.
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "check.h"
 #include "prehensile/differential_ik.h"
 #include "prehensile/quadratic_program.h"
 
@@ -16,14 +16,6 @@ namespace prehensile {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-int failures = 0;
-
-void Check(bool condition, const std::string& what) {
-  if (condition) return;
-  std::printf("FAILED: %s\n", what.c_str());
-  ++failures;
-}
-
 void TestProgram() {
   // min ½ |x − (5, −3)|² subject to x − y <= 6: the nearest point of the half-plane is (4, −2).
   LeastSquaresCost cost(2);
@@ -110,13 +102,63 @@ void TestGreatestSizes(IkFormulation formulation, IkCentering centering) {
   }
 }
 
-void TestErrors() {
-  try {
-    DifferentialIk({{0.0}, {1.0}, {1.0}, {0.0}}, {});
-    Check(false, "no acceleration is refused");
-  } catch (const std::invalid_argument& error) {
-    Check(std::string(error.what()).starts_with("limits:"), "names the limits");
+// Numbers from the least to the greatest that there are: whatever overflows, limits are kept.
+void TestNumbersOfAllSizes() {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto any = [&] {
+    const double x = uniform(random);
+    const double range = random() % 2 == 0 ? 3.0 : 308.0;
+    return random() % 8 == 0 ? 0.0 : std::copysign(std::pow(10.0, range * uniform(random)), x);
+  };
+  const int n = 4, k = 3, m = 2;
+  for (int trial = 0; trial < 20000; ++trial) {
+    JointLimits limits{std::vector<double>(n), std::vector<double>(n), std::vector<double>(n),
+                       std::vector<double>(n)};
+    for (int i = 0; i < n; ++i) {
+      limits.position_lower[i] = random() % 4 == 0 ? -kInfinity : -std::abs(any());
+      limits.position_upper[i] = random() % 4 == 0 ? kInfinity : std::abs(any());
+      limits.velocity[i] = random() % 4 == 0 ? kInfinity : std::abs(any());
+      limits.acceleration[i] = random() % 4 == 0 ? kInfinity : std::abs(any()) + 1e-300;
+    }
+    DifferentialIkOptions options;
+    options.period = std::pow(10.0, -3.0 * std::abs(uniform(random)));
+    options.formulation = static_cast<IkFormulation>(trial % 4);
+    options.centering = static_cast<IkCentering>(trial % 3);
+    options.damping = trial % 2 == 0 ? 0.0 : std::abs(any());
+    options.centering_gain.assign(n, any());
+    options.nominal_position.assign(n, any());
+    const DifferentialIk ik(limits, options);
+    double q[n], v[n], J[k * n], V[k], A[m * n], lower[m], upper[m];
+    for (double& x : q) x = any();
+    for (double& x : v) x = any();
+    for (double& x : J) x = any();
+    for (double& x : V) x = any();
+    for (double& x : A) x = any();
+    for (int i = 0; i < m; ++i) {
+      const double a = any(), b = any();
+      lower[i] = std::min(a, b);
+      upper[i] = std::max(a, b);
+    }
+    const int sizes[] = {1, 2};
+    IkStep step;
+    ik.Step(q, v, {k, J, V, nullptr, sizes, 2}, {trial % 5 == 0 ? m : 0, A, lower, upper}, &step);
+    bool kept = true;
+    for (int i = 0; i < n; ++i) {
+      const double change = limits.acceleration[i] * options.period;
+      const double slack = 1e-12 * (std::abs(v[i]) + 1.0);
+      kept = kept && std::isfinite(step.v[i]) && step.lower[i] <= step.v[i] &&
+             step.v[i] <= step.upper[i] && std::abs(step.v[i] - v[i]) <= change + slack;
+    }
+    Check(kept, "limits are kept, trial " + std::to_string(trial));
   }
+}
+
+void TestErrors() {
+  CheckThrows("limits", [] { DifferentialIk({{0.0}, {1.0}, {1.0}, {0.0}}, {}); });
+  const DifferentialIk ik({{0.0}, {1.0}, {1.0}, {1.0}}, {});
+  CheckThrows("num_threads",
+              [&] { ik.StepBatch(0, nullptr, nullptr, {}, {}, nullptr, nullptr, 0); });
 }
 
 }  // namespace
@@ -134,6 +176,7 @@ int main() {
       TestGreatestSizes(formulation, centering);
     }
   }
+  TestNumbersOfAllSizes();
   TestErrors();
   return failures;
 }

@@ -1,15 +1,14 @@
-// The kernels of kinematics: every SIMD level gives the same bits. Prints what failed, and exits
-// with the number of failures.
+// The kernels of kinematics: every SIMD level gives the same bits.
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "check.h"
 #include "kinematics_kernel.h"
 #include "prehensile/kinematic_tree.h"
 #include "prehensile/simd.h"
@@ -19,14 +18,6 @@ namespace {
 
 using internal::KinematicsKernel;
 using internal::kLanes;
-
-int failures = 0;
-
-void Check(bool condition, const std::string& what) {
-  if (condition) return;
-  std::printf("FAILED: %s\n", what.c_str());
-  ++failures;
-}
 
 constexpr int kJoints = 7;
 
