@@ -3,7 +3,7 @@
 #
 # The box is too wide for either hand. Two arms press it between their fingers, lift it, carry it
 # forwards while they tip it, and put it back. One arm's motion is planned; the other one's is its
-# mirror image. (Section 2.1; `prehensile demo bimanual` shows it.)
+# mirror image. (Example 2.7; `prehensile demo bimanual` shows it.)
 
 # %%
 import matplotlib.pyplot as plt

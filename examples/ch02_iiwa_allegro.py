@@ -4,7 +4,7 @@
 # An iiwa carries an Allegro hand: seven joints and sixteen. It reaches for a can, the fingers wrap
 # it and press it into the palm, and the arm lifts it. Each has a controller of its own: the arm's
 # is the one of its maker, which is told the hand's weight; a stiffness holds each joint of the
-# hand. (Section 2.3; `prehensile demo iiwa-allegro` shows all of it.)
+# hand. (Example 2.8; `prehensile demo iiwa-allegro` shows all of it.)
 
 # %%
 import matplotlib.pyplot as plt

@@ -3,7 +3,7 @@
 #
 # Every arm among the models, side by side: how many joints, how far they reach, how much of their
 # motors' torque goes into carrying the arm itself, how much of the inertia at a joint is the
-# motor's, and what a seventh joint is good for. (Section 2.1; `prehensile demo arms` moves them.)
+# motor's, and what a seventh joint is good for. (Example 2.1; `prehensile demo arms` moves them.)
 
 # %%
 import matplotlib.pyplot as plt

@@ -2,7 +2,7 @@
 # # A gallery of hands
 #
 # Every hand among the models, open and closed, and what there is to see in two of them: a gripper
-# whose fingers have more joints than motors, and a hand with a motor at every joint. (Section 2.3;
+# whose fingers have more joints than motors, and a hand with a motor at every joint. (Example 2.5;
 # `prehensile demo hands` moves them.)
 
 # %%
