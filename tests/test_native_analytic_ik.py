@@ -369,6 +369,24 @@ def test_threads_do_not_matter() -> None:
         assert STATUSES[one[1][k]] == single.status
 
 
+@pytest.mark.parametrize("straight", [[1], [3], [5], [1, 3], [1, 5], [3, 5], [1, 3, 5], range(7)])
+def test_closest_of_a_singular_configuration_is_itself(straight: list[int]) -> None:
+    arm, rng = SRS.make(SrsArm), np.random.default_rng(9)
+    for _ in range(20):
+        q = rng.uniform(-2.0, 2.0, 7)
+        q[list(straight)] = 0.0
+        np.testing.assert_allclose(arm.closest(arm.pose(q), q).q, q, atol=1e-6)
+
+
+@six_joints
+def test_no_pose_is_near_that_is_far(lines: Lines, kind: type) -> None:
+    arm = lines.make(kind)
+    for far in (1e4, 1e160, 1.7e308):
+        X_WG = np.eye(4)
+        X_WG[:3, 3] = [0.3 * far, -far, 0.1 * far]
+        assert arm.solve(X_WG, limits=False).status == "too far"
+
+
 def test_bad_input() -> None:
     arm = UR.make(UrArm)
     X_WG = np.eye(4)
@@ -382,6 +400,8 @@ def test_bad_input() -> None:
         arm.solve(np.eye(4), q_near=np.zeros(5))
     with pytest.raises(ValueError, match="q_near"):
         arm.solve(np.eye(4), q_near=np.full(6, np.nan))
+    with pytest.raises(ValueError, match="q_near: .* 1e6"):
+        arm.solve(np.eye(4), q_near=np.full(6, 1e7))
     with pytest.raises(ValueError, match="num_threads"):
         arm.solve_batch(np.eye(4)[None], num_threads=0)
     with pytest.raises(ValueError, match="psi"):
