@@ -7,7 +7,7 @@ CPP := $(filter %.cpp %.h,$(NATIVE))
 RUN := .venv/bin
 PIP = $(RUN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help demo test test-all test-cpp bench docs examples lint format models clean
+.PHONY: help demo test test-all test-cpp sanitize bench docs examples lint format models clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1|/' | column -t -s '|'
@@ -23,6 +23,8 @@ test-all: .venv/.dev test-cpp  ## every test
 	$(RUN)/python -m pytest
 
 test-cpp: build/cpp/.tested  ## the C++ library's own tests
+
+sanitize: build/sanitized/.tested  ## the same with AddressSanitizer and UndefinedBehaviorSanitizer
 
 bench: .venv/.installed  ## our speed beside the peers', each in a virtual environment of its own
 	$(RUN)/prehensile bench
@@ -73,10 +75,18 @@ build/examples/.run: .venv/.dev $(wildcard examples/*.py)
 	@touch $@
 
 # The C++ library by itself, as a C++ project would build it.
-build/cpp/.tested: .venv/.dev $(NATIVE)
+SANITIZED := -O1 -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+define TEST_CPP
 	$(PIP) --no-deps --upgrade --target build/eigen cmeel-eigen
-	$(RUN)/cmake -S . -B build/cpp -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(RUN)/ninja \
-	  -DCMAKE_PREFIX_PATH=$(CURDIR)/build/eigen/cmeel.prefix
-	$(RUN)/cmake --build build/cpp
-	$(RUN)/ctest --test-dir build/cpp --output-on-failure
+	$(RUN)/cmake -S . -B $(@D) -G Ninja -DCMAKE_MAKE_PROGRAM=$(CURDIR)/$(RUN)/ninja \
+	  -DCMAKE_PREFIX_PATH=$(CURDIR)/build/eigen/cmeel.prefix $(1)
+	$(RUN)/cmake --build $(@D)
+	$(RUN)/ctest --test-dir $(@D) --output-on-failure
 	@touch $@
+endef
+
+build/cpp/.tested: .venv/.dev $(NATIVE)
+	$(call TEST_CPP)
+
+build/sanitized/.tested: .venv/.dev $(NATIVE)
+	$(call TEST_CPP,-DCMAKE_BUILD_TYPE=Debug '-DCMAKE_CXX_FLAGS=$(SANITIZED)')
