@@ -56,10 +56,12 @@ def test_ellipsoids_of_any_radii_can_be_drawn(meshcat):
         ({"radii": (1, np.nan, 1)}, "radii"),
         ({"radii": (1, 1)}, "radii"),
         ({"axes": np.ones((3, 3))}, "axes"),
+        ({"axes": np.diag([1.0, 1.0, -1.0])}, "axes"),
         ({"scale": 0.0}, "scale"),
+        ({"p_WE": (0.0, np.nan, 0.0)}, "p_WE"),
     ],
 )
 def test_bad_arguments_are_named(meshcat, change, argument):
-    good = {"axes": np.eye(3), "radii": (1, 1, 1), "scale": 1.0}
+    good = {"p_WE": (0, 0, 0), "axes": np.eye(3), "radii": (1, 1, 1), "scale": 1.0}
     with pytest.raises(ValueError, match=f"^{argument}: "):
-        draw_ellipsoid(meshcat, "bad", (0, 0, 0), **(good | change))
+        draw_ellipsoid(meshcat, "bad", **(good | change))

@@ -167,3 +167,15 @@ def test_path_in_space_has_a_name_for_each_place():
     x, y, z = (np.asarray(a) for a in ax.lines[0].get_data_3d())
     np.testing.assert_allclose([x[0], y[0], z[0]], KEYFRAMES["start"].translation())
     np.testing.assert_allclose([x[-1], y[-1], z[-1]], KEYFRAMES["end"].translation())
+
+
+def test_what_cannot_be_drawn_is_named():
+    meshcat = start_meshcat(open_browser=False)
+    for sizes in ({"length": 0.0}, {"radius": np.nan}):
+        with pytest.raises(ValueError, match="^length, radius"):
+            draw_triad(meshcat, "frame", RigidTransform(), **sizes)
+    for start, end in ((0.0, np.inf), (1.0, 0.0), (np.nan, 1.0)):
+        with pytest.raises(ValueError, match="^start, end"):
+            draw_pose_trajectory(meshcat, "line", lambda t: RigidTransform(), start, end)
+    with pytest.raises(ValueError, match="finite"):
+        animate(meshcat, lambda t: None, 0.0, np.inf)

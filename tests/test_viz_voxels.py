@@ -68,3 +68,9 @@ def test_slices_show_the_voxels_at_the_cut():
 def test_values_must_be_a_box():
     with pytest.raises(ValueError, match="^values: "):
         plot_slices(np.zeros((2, 2)), (0, 0, 0), 1.0, label="")
+    with pytest.raises(ValueError, match="^values: "):
+        plot_slices(np.zeros((0, 2, 2)), (0, 0, 0), 1.0, label="")
+    with pytest.raises(ValueError, match="^voxel_size: "):
+        plot_slices(np.zeros((2, 2, 2)), (0, 0, 0), 0.0, label="")
+    with pytest.raises(ValueError, match="^at: "):
+        plot_slices(np.zeros((2, 2, 2)), (0, 0, 0), 1.0, label="", at=(np.nan, 0.0))

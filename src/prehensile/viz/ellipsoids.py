@@ -37,16 +37,21 @@ def draw_ellipsoid(
         color: default: a transparent orange.
 
     Raises:
-        ValueError: axes are no rotation, a radius is negative or NaN, scale is not positive.
+        ValueError: axes are no rotation, a radius is negative or NaN, scale is not positive, the
+            centre is not finite.
     """
     lengths = _drawable("radii", radii, 3) * _positive("scale", scale)
     # Drake compares rotations to 1e-13; singular vectors may be a little farther off.
     axes = np.asarray(axes, dtype=float)
-    if axes.shape != (3, 3) or not np.allclose(axes.T @ axes, np.eye(3), atol=1e-6):
-        raise ValueError("axes: must be (3, 3) and orthonormal")
+    orthonormal = axes.shape == (3, 3) and np.allclose(axes.T @ axes, np.eye(3), atol=1e-6)
+    if not orthonormal or np.linalg.det(axes) < 0.0:
+        raise ValueError("axes: must be (3, 3), orthonormal and right-handed")
+    p_WE = np.asarray(p_WE, dtype=float)
+    if p_WE.shape != (3,) or not np.isfinite(p_WE).all():
+        raise ValueError(f"p_WE: must be three finite numbers, got {p_WE}")
     R_WE = RotationMatrix.ProjectToRotationMatrix(axes)
     meshcat.SetObject(path, Ellipsoid(*lengths), color or Rgba(1.0, 0.55, 0.1, 0.5))
-    meshcat.SetTransform(path, RigidTransform(R_WE, np.asarray(p_WE, dtype=float)))
+    meshcat.SetTransform(path, RigidTransform(R_WE, p_WE))
 
 
 def projected(axes: ArrayLike, radii: ArrayLike, rows: tuple[int, int]) -> Ellipse:

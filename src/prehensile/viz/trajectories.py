@@ -49,7 +49,12 @@ def draw_triad(
         length: of an axis, in m.
         radius: of an axis, in m.
         opacity: 0 to 1.
+
+    Raises:
+        ValueError: a length or radius that is not positive and finite.
     """
+    if not (0.0 < length < np.inf and 0.0 < radius < np.inf):  # Drake would end the process
+        raise ValueError(f"length, radius: must be positive and finite, not {length}, {radius}")
     turns = (
         RotationMatrix.MakeYRotation(np.pi / 2),
         RotationMatrix.MakeXRotation(-np.pi / 2),
@@ -89,8 +94,8 @@ def draw_pose_trajectory(
         line_width: in pixels.
         length: of the axes, in m.
     """
+    origins = [pose(t).translation() for t in _times(start, end, _SAMPLES)]
     meshcat.Delete(path)
-    origins = [pose(t).translation() for t in np.linspace(start, end, _SAMPLES)]
     meshcat.SetLine(f"{path}/line", np.asfortranarray(np.transpose(origins)), line_width, color)
     for name, X_WB in (keyframes or {}).items():
         draw_triad(meshcat, f"{path}/keyframes/{name}", X_WB, length=length)
@@ -123,8 +128,8 @@ def animate(
         start, end: first and last time, in s.
         frames_per_second: frames per second of the motion (> 0).
     """
-    if not (frames_per_second > 0.0 and end >= start):
-        raise ValueError("frames_per_second must be positive, and end not before start")
+    if not (0.0 < frames_per_second < np.inf and 0.0 <= end - start < np.inf):
+        raise ValueError("frames_per_second must be positive, and end not before start; all finite")
     # Whole frames, so that a recording at the same rate keeps each of them, and both ends.
     first, last = start * frames_per_second, end * frames_per_second
     for frame in range(math.floor(first), math.ceil(last) + 1):
@@ -174,7 +179,7 @@ def plot_pose_trajectory(
         A figure of four plots: position and orientation (roll, pitch, yaw, without jumps of a whole
         turn), below them their velocities.
     """
-    times = np.linspace(start, end, 2 * _SAMPLES)
+    times = _times(start, end, 2 * _SAMPLES)
     poses = [pose(t) for t in times]
     p = np.array([X.translation() for X in poses])
     rpy = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
@@ -236,7 +241,7 @@ def plot_joint_trajectory(
         if np.shape(values) != (trajectory.rows(),):
             raise ValueError(f"{name} must be ({trajectory.rows()},), got {np.shape(values)}")
     start, end = trajectory.start_time(), trajectory.end_time()
-    times = np.linspace(start, end, 2 * _SAMPLES)
+    times = _times(start, end, 2 * _SAMPLES)
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     bounded = np.isfinite(low) & np.isfinite(high)
     middle = np.where(bounded, 0.5 * (np.where(bounded, low, 0) + np.where(bounded, high, 0)), 0.0)
@@ -286,7 +291,7 @@ def plot_pose_trajectory_3d(
         keyframes: poses to draw, by name.
         length: of the axes, in m.
     """
-    p = np.array([pose(t).translation() for t in np.linspace(start, end, _SAMPLES)])
+    p = np.array([pose(t).translation() for t in _times(start, end, _SAMPLES)])
     figure = Figure(figsize=(7.0, 6.0), layout="constrained")
     ax = figure.add_subplot(projection="3d")
     ax.plot(*p.T, color="#55606c", linewidth=1.5)
@@ -304,12 +309,19 @@ def plot_pose_trajectory_3d(
     lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
     for set_limits, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), lower, upper, strict=True):
         set_limits(a - 0.02, b + 0.02)
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_major_locator(MultipleLocator(0.1))
+    if np.max(upper - lower) < 2.0:
+        for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+            axis.set_major_locator(MultipleLocator(0.1))
     ax.set_box_aspect(upper - lower + 0.04)
     for label, name in zip((ax.set_xlabel, ax.set_ylabel, ax.set_zlabel), "xyz", strict=True):
         label(f"{name} (m)")
     return figure
+
+
+def _times(start: float, end: float, count: int) -> NDArray[np.float64]:
+    if not 0.0 <= end - start < np.inf:
+        raise ValueError(f"start, end: must be finite, end not before start, got {start}, {end}")
+    return np.linspace(start, end, count)
 
 
 def _finish(ax: Axes, start: float, end: float, keyframes: Mapping[str, float] | None) -> None:

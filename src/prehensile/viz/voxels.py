@@ -32,9 +32,9 @@ def draw_voxels(
         limits: values at the ends of the colour scale; default: the least and the largest.
 
     Raises:
-        ValueError: values is not three-dimensional.
+        ValueError: values is not three-dimensional, or voxel_size is not positive.
     """
-    values = _box(values)
+    values = _box(values, voxel_size)
     low, high = limits or _limits(values)
     shade = np.clip((values - low) / max(high - low, 1e-300) * _STEPS, 0, _STEPS - 1)
     at, quads = _faces(np.isfinite(values))
@@ -90,9 +90,12 @@ def plot_slices(
         limits: values at the ends of the colour scale; default: the least and the largest.
 
     Raises:
-        ValueError: values is not three-dimensional, or a cut is not finite.
+        ValueError: values is not three-dimensional or empty, voxel_size is not positive, or a cut
+            is not finite.
     """
-    values = _box(values)
+    values = _box(values, voxel_size)
+    if values.size == 0:
+        raise ValueError(f"values: there are none, {values.shape}")
     if not np.isfinite(at).all():
         raise ValueError(f"at: must be finite, not {at}")
     low = np.array(first) * voxel_size
@@ -130,10 +133,12 @@ def plot_slices(
     return figure
 
 
-def _box(values: ArrayLike) -> NDArray[np.float64]:
+def _box(values: ArrayLike, voxel_size: float) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=float)
     if array.ndim != 3:
         raise ValueError(f"values: expected (nx, ny, nz), not {array.shape}")
+    if not 0.0 < voxel_size < np.inf:
+        raise ValueError(f"voxel_size: must be positive and finite, not {voxel_size}")
     return array
 
 
