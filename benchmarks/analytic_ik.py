@@ -1,7 +1,7 @@
 """All solutions of inverse kinematics in closed form: a UR5 and an iiwa 14."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -76,15 +76,12 @@ def _load(folder: Path, name: str) -> dict[str, np.ndarray]:
 
 def _measure(
     name: str,
-    poses: Sequence[np.ndarray],
-    solve: Callable[[np.ndarray], object],
-    solve_and_read: Callable[[np.ndarray], object],
+    solve: Callable[[], object],
+    solve_and_read: Callable[[], object],
     batch: Callable[[], object],
     solutions: float,
 ) -> dict[str, Samples]:
-    def each(one: Callable[[np.ndarray], object]) -> None:
-        for X_WG in poses:
-            one(X_WG)
+    """Of three ways to go through all poses, the first two by a loop of calls."""
 
     def per_pose(call: Callable[[], object]) -> Samples:
         # Of the processor: the calls are so short that any other program would show in wall time.
@@ -96,8 +93,8 @@ def _measure(
         return Samples(microseconds[1:], "µs")
 
     return {
-        f"{name}: a call": per_pose(lambda: each(solve)),
-        f"{name}: a call, solutions read": per_pose(lambda: each(solve_and_read)),
+        f"{name}: a call": per_pose(solve),
+        f"{name}: a call, solutions read": per_pose(solve_and_read),
         f"{name}: in a batch": per_pose(batch),
         f"{name}: solutions": Samples([solutions], "a pose", more_is_better=True),
     }
@@ -114,24 +111,44 @@ def ours(folder: Path) -> Results:
         limit = np.full(len(data["H"]), np.pi)
         return kind(data["H"], points[:-1].copy(), X_WG0, -limit, limit)
 
+    def measure(name: str, arm: Any, X_WG: np.ndarray) -> dict[str, Samples]:
+        solve, poses = arm.solve, list(X_WG)
+
+        def each() -> None:
+            for X in poses:
+                solve(X)
+
+        def each_read() -> None:
+            for X in poses:
+                solve(X).q  # noqa: B018
+
+        return _measure(name, each, each_read, lambda: arm.solve_batch(X_WG), check(arm, X_WG))
+
+    def measure_srs(name: str, arm: SrsArm, X_WG: np.ndarray) -> dict[str, Samples]:
+        solve, poses, psi = arm.solve, list(X_WG), np.zeros(POSES)
+
+        def each() -> None:
+            for X in poses:
+                solve(X, 0.0)
+
+        def each_read() -> None:
+            for X in poses:
+                solve(X, 0.0).q  # noqa: B018
+
+        count = check(arm, X_WG, 0.0)
+        return _measure(name, each, each_read, lambda: arm.solve_batch(X_WG, psi), count)
+
+    def check(arm: Any, poses: np.ndarray, *psi: float) -> float:
+        found = [arm.solve(X_WG, *psi).q for X_WG in poses]
+        for X_WG, rows in zip(poses, found, strict=True):
+            assert all(np.abs(arm.pose(q) - X_WG).max() < 1e-9 for q in rows)
+        return float(np.mean([len(rows) for rows in found]))
+
     results: dict[str, Samples] = {}
     for name, kind in ((UR, UrArm), (LOCKED, PieperArm), (IIWA, SrsArm)):
         data = _load(folder, name)
         arm = arm_of(kind, data)
-        psi = () if kind is not SrsArm else (0.0,)
-        psi_batch = () if kind is not SrsArm else (np.zeros(POSES),)
-        poses = list(data["X_WG"])
-        found = [arm.solve(X_WG, *psi).q for X_WG in poses]
-        for X_WG, rows in zip(poses, found, strict=True):
-            assert all(np.abs(arm.pose(q) - X_WG).max() < 1e-9 for q in rows)
-        results |= _measure(
-            name,
-            poses,
-            arm.solve if not psi else lambda X_WG, arm=arm: arm.solve(X_WG, 0.0),
-            lambda X_WG, arm=arm, psi=psi: arm.solve(X_WG, *psi).q,
-            partial(arm.solve_batch, data["X_WG"], *psi_batch),
-            float(np.mean([len(rows) for rows in found])),
-        )
+        results |= (measure_srs if kind is SrsArm else measure)(name, arm, data["X_WG"])
     return results
 
 
@@ -139,20 +156,26 @@ def eaik(folder: Path) -> Results:
     """``IK`` and ``IK_batched``; approximate solutions are not counted."""
     from eaik.IK_HP import HPRobot  # pyright: ignore[reportMissingImports]
 
+    def measure(name: str, robot: Any, poses: list[np.ndarray]) -> dict[str, Samples]:
+        solve = robot.IK
+
+        def each() -> None:
+            for X in poses:
+                solve(X)
+
+        def each_read() -> None:
+            for X in poses:
+                solve(X).Q  # noqa: B018
+
+        exact = [len(got.Q) - int(np.sum(got.is_LS)) for got in map(solve, poses)]
+        batch = partial(robot.IK_batched, poses, 1)
+        return _measure(name, each, each_read, batch, float(np.mean(exact)))
+
     results: dict[str, Samples] = {}
     for name in (UR, LOCKED, IIWA):
         data = _load(folder, name)
         robot = HPRobot(data["H"], data["P"], fixed_axes=[(2, 0.0)] if name == IIWA else [])
-        poses = list(data["X_WG"])
-        exact = [len(got.Q) - int(np.sum(got.is_LS)) for got in map(robot.IK, poses)]
-        results |= _measure(
-            name,
-            poses,
-            robot.IK,
-            lambda X_WG, robot=robot: robot.IK(X_WG).Q,
-            partial(robot.IK_batched, poses, 1),
-            float(np.mean(exact)),
-        )
+        results |= measure(name, robot, list(data["X_WG"]))
     return results
 
 
