@@ -4,6 +4,7 @@ import dataclasses as dc
 
 import numpy as np
 import pytest
+from iiwa_plant import make_iiwa
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RevoluteJoint, SpatialInertia, UnitInertia
@@ -49,11 +50,7 @@ def drake_pendulum(pendulum: GearedPendulum) -> MultibodyPlant:
 
 @pytest.fixture(scope="module")
 def iiwa():
-    plant = MultibodyPlant(0.0)
-    Parser(plant).AddModels(str(find_model("iiwa7").path))
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
-    return plant
+    return make_iiwa()
 
 
 @pytest.mark.parametrize("pendulum", [DIRECT, GEARED])

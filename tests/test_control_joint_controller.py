@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from iiwa_plant import make_iiwa
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.controllers import JointStiffnessController
 from pydrake.systems.framework import DiagramBuilder
@@ -101,17 +102,9 @@ def _add_plant(builder, time_step):
     return AddMultibodyPlant(MultibodyPlantConfig(time_step=time_step), builder)
 
 
-def iiwa_plant() -> MultibodyPlant:
-    plant = MultibodyPlant(0.0)
-    Parser(plant).AddModels(str(find_model("iiwa7").path))
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
-    return plant
-
-
 @pytest.fixture(scope="module")
 def iiwa():
-    return iiwa_plant()
+    return make_iiwa()
 
 
 def states(plant, count=5):
@@ -270,7 +263,7 @@ def test_a_robot_among_other_things_needs_a_model_of_itself():
     gains = gains_for_bandwidth(np.full(7, 5.0), 20.0)
     with pytest.raises(ValueError, match="controller_plant"):
         add_joint_controller(builder, plant, [arm], JointControllerConfig(gains))
-    model = iiwa_plant()
+    model = make_iiwa()
     ports = add_joint_controller(
         builder, plant, [arm], JointControllerConfig(gains), controller_plant=model, name="arm"
     )

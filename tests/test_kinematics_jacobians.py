@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
+from iiwa_plant import make_iiwa
 
 from prehensile.kinematics.jacobians import (
     condition_number,
@@ -18,7 +17,6 @@ from prehensile.kinematics.jacobians import (
     velocity_ellipsoid,
 )
 from prehensile.kinematics.tree import tree_from_plant
-from prehensile.models.registry import package_map
 
 
 def planar(q, l1=0.5, l2=0.3):
@@ -34,12 +32,7 @@ def planar(q, l1=0.5, l2=0.3):
 
 @pytest.fixture(scope="module")
 def iiwa():
-    plant = MultibodyPlant(0.0)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
+    plant = make_iiwa()
     return tree_from_plant(plant, [plant.GetFrameByName("iiwa_link_7")]).tree
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from iiwa_plant import make_iiwa
 from PIL import Image
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -29,19 +30,9 @@ from prehensile.native.reachability import sample_configurations
 ARRAYS = ("counts", "reached", "manipulability", "singular_value")
 
 
-def iiwa_plant():
-    plant = MultibodyPlant(0.0)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
-    return plant
-
-
 @pytest.fixture(scope="module")
 def iiwa():
-    plant = iiwa_plant()
+    plant = make_iiwa()
     return tree_from_plant(plant, [plant.GetFrameByName("iiwa_link_7")])
 
 
@@ -70,7 +61,7 @@ def test_drake_finds_the_same_in_the_same_configurations(iiwa):
         num_samples=2000, voxel_size=0.2, num_directions=26, axis=(0, 1, 1), length=0.7, seed=5
     )
     reach = reachability_map(iiwa, config)
-    plant = iiwa_plant()
+    plant = make_iiwa()
     context = plant.CreateDefaultContext()
     F, W = plant.GetFrameByName("iiwa_link_7"), plant.world_frame()
     counts, seen = {}, {}

@@ -4,9 +4,8 @@ import functools
 
 import numpy as np
 import pytest
+from iiwa_plant import make_iiwa
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
 from prehensile.kinematics.differential_ik import (
@@ -19,7 +18,6 @@ from prehensile.kinematics.differential_ik import (
 from prehensile.kinematics.poses import pose_distance
 from prehensile.kinematics.systems import DifferentialInverseKinematics
 from prehensile.kinematics.tree import PlantTree, tree_from_plant
-from prehensile.models.registry import package_map
 
 Q0 = np.array([0.2, 0.6, 0.1, -1.7, 0.1, 0.9, 0.3])
 HAND, ELBOW = "iiwa_link_7", "iiwa_link_4"
@@ -27,12 +25,7 @@ HAND, ELBOW = "iiwa_link_7", "iiwa_link_4"
 
 @functools.cache
 def iiwa() -> PlantTree:
-    plant = MultibodyPlant(0.0)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
+    plant = make_iiwa()
     return tree_from_plant(plant, [plant.GetFrameByName(HAND), plant.GetFrameByName(ELBOW)])
 
 

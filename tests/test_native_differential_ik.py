@@ -7,9 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from iiwa_plant import make_iiwa
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import ClarabelSolver, MathematicalProgram, SolverOptions
 
 from prehensile.kinematics.differential_ik import (
@@ -21,7 +20,6 @@ from prehensile.kinematics.differential_ik import (
 )
 from prehensile.kinematics.poses import pose_error
 from prehensile.kinematics.tree import PlantTree, tree_from_plant
-from prehensile.models.registry import package_map
 
 RELAXED, BRAKING = 2, 3
 
@@ -29,12 +27,7 @@ RELAXED, BRAKING = 2, 3
 @functools.cache
 def iiwa() -> PlantTree:
     """With the frames of its links 7 and 4."""
-    plant = MultibodyPlant(0.0)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
+    plant = make_iiwa()
     return tree_from_plant(plant, [plant.GetFrameByName(f"iiwa_link_{i}") for i in (7, 4)])
 
 

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from iiwa_plant import make_iiwa
 from pydrake.multibody.optimization import Toppra
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.trajectories import PiecewisePolynomial
 
 from prehensile.errors import InputError
 from prehensile.kinematics.joint_limits import JointLimits
-from prehensile.models.registry import package_map
 from prehensile.planning.blend import round_corners
 from prehensile.planning.time_optimal import fastest_profile
 from prehensile.planning.trajectory import join_paths, time_parameterize
@@ -67,12 +65,7 @@ def test_the_motion_keeps_to_its_path(deviation):
 
 
 def test_as_quick_as_drake_on_the_same_rounded_path():
-    plant = MultibodyPlant(0.0)
-    parser = Parser(plant)
-    parser.package_map().AddMap(package_map())
-    parser.AddModels(url="package://prehensile/iiwa7/iiwa7.sdf")
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("iiwa_link_0"))
-    plant.Finalize()
+    plant = make_iiwa()
     for seed in range(5):
         smooth = round_corners(random_path(seed, 6), 0.02)
         x = fastest_profile(smooth, LIMITS.velocity, LIMITS.acceleration)

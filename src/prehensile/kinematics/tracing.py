@@ -41,7 +41,8 @@ class TracingConfig:
     """How a path of poses is traced.
 
     Attributes:
-        tolerance: largest deviation of the frame from its path, in m and in rad, in (0, 0.01].
+        tolerance: largest deviation of the frame from its path half-way between two solved poses,
+            where it is about the largest, in m and in rad, in (0, 0.01].
         translation: first distance between two solved poses, in m, in (0, 0.2].
         rotation: first angle between two solved poses, in rad, in (0, 0.5].
         max_joint_step: largest change of a joint between two solved poses, in rad or m, in (0, 1].
