@@ -140,6 +140,11 @@ def test_misuse_is_named(plant):
         integrate(plant, np.zeros(nq + 1), np.zeros(nv))
     with pytest.raises(ValueError, match="v must be"):
         integrate(plant, np.zeros(nq), np.zeros(nv + 1))
+    q = plant.GetPositions(plant.CreateDefaultContext())
+    with pytest.raises(ValueError, match="v must be finite"):
+        integrate(plant, q, np.full(nv, np.nan))
+    with pytest.raises(ValueError, match="duration must be finite"):
+        integrate(plant, q, np.zeros(nv), np.inf)
     ball = MultibodyPlant(0.0)
     body = ball.AddRigidBody("body", INERTIA)
     ball.AddJoint(BallRpyJoint("ball", ball.world_frame(), body.body_frame()))

@@ -282,3 +282,10 @@ def test_arm_that_has_nowhere_to_go_stays(tree):
     assert motion.found
     assert motion.duration == 0.0
     np.testing.assert_allclose(motion.joints.value(0.0).ravel(), Q_HOME, atol=1e-12)
+
+
+@pytest.mark.parametrize("change", [{"p_GPre": [0.0, 1.0]}, {"clearance": np.nan}])
+def test_misuse_of_the_usual_keyframes_is_named(change):
+    X_WG = RigidTransform([0.5, 0.0, 0.3])
+    with pytest.raises(ValueError, match=f"^{next(iter(change))} must"):
+        pick_and_place_keyframes(X_WG, X_WG, X_WG, **change)

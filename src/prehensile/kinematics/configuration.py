@@ -84,9 +84,11 @@ def integrate(plant: MultibodyPlant, q: ArrayLike, v: ArrayLike, duration: float
         (nq,).
 
     Raises:
-        ValueError: another shape, or another joint without qdot = v.
+        ValueError: another shape, numbers that are not finite, or another joint without qdot = v.
     """
     q, v = _vectors(plant, q, v)
+    if not np.isfinite(duration):
+        raise ValueError(f"duration must be finite, got {duration}")
     out = q.copy()
     for position, velocity, size in _blocks(plant):
         if size == 1:
@@ -135,6 +137,9 @@ def _vectors(plant: MultibodyPlant, q: ArrayLike, v: ArrayLike) -> tuple[Array, 
         raise ValueError(f"q must be ({plant.num_positions()},), got {q.shape}")
     if v.shape != (plant.num_velocities(),):
         raise ValueError(f"v must be ({plant.num_velocities()},), got {v.shape}")
+    for name, values in (("q", q), ("v", v)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} must be finite, got {values}")
     return q, v
 
 

@@ -160,8 +160,16 @@ def pick_and_place_keyframes(
         open_width, closed_width: openings of the hand, in m.
         dwell: time for the fingers to close or open, in s.
         blend: how far from lift, clearance and preplace the hand may pass, in m; 0 stops there.
+
+    Raises:
+        ValueError: p_GPre or clearance is not finite.
     """
-    X_GPre = RigidTransform(np.asarray(p_GPre, float))
+    p_GPre = np.asarray(p_GPre, float)
+    if p_GPre.shape != (3,) or not np.isfinite(p_GPre).all():
+        raise ValueError(f"p_GPre must be three finite numbers, got {p_GPre}")
+    if not np.isfinite(clearance):
+        raise ValueError(f"clearance must be finite, got {clearance}")
+    X_GPre = RigidTransform(p_GPre)
     X_WGprepick, X_WGpreplace = X_WGpick @ X_GPre, X_WGplace @ X_GPre
     poses = [X_WGprepick, X_WGpreplace]
     middle = PoseTrajectory(poses, [law_progress(0.0, 1.0, "linear")]).value(0.5)
