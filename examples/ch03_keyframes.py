@@ -12,7 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from prehensile.kinematics.keyframes import Keyframe, keyframe_motion, time_keyframes
+from prehensile.kinematics.keyframe_timing import keyframe_motion, time_keyframes
+from prehensile.kinematics.keyframes import Keyframe
 from prehensile.kinematics.tree import tree_from_plant
 from prehensile.station import build, load_scenario
 from prehensile.viz.figures import save_figure

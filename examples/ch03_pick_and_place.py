@@ -19,7 +19,8 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import TrajectorySource
 
 from prehensile.kinematics.differential_ik import DifferentialIkConfig, FrameTask
-from prehensile.kinematics.keyframes import Keyframe, TimingConfig, time_keyframes
+from prehensile.kinematics.keyframe_timing import TimingConfig, time_keyframes
+from prehensile.kinematics.keyframes import Keyframe
 from prehensile.kinematics.poses import pose_distance
 from prehensile.kinematics.systems import DifferentialInverseKinematics
 from prehensile.kinematics.tree import tree_from_plant

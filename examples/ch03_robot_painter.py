@@ -8,7 +8,8 @@
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from prehensile.kinematics.keyframes import Keyframe, time_keyframes
+from prehensile.kinematics.keyframe_timing import time_keyframes
+from prehensile.kinematics.keyframes import Keyframe
 from prehensile.kinematics.tracing import nearest_configuration, posture_near
 from prehensile.kinematics.tree import tree_from_plant
 from prehensile.station import build, load_scenario

@@ -7,13 +7,9 @@ import pytest
 from arm_scene import make_diagram
 from pydrake.math import RigidTransform, RotationMatrix
 
-from prehensile.kinematics.keyframes import (
-    Keyframe,
-    TimingConfig,
-    keyframe_motion,
-    pick_and_place_keyframes,
-    time_keyframes,
-)
+from prehensile.kinematics.joint_limits import JointLimits
+from prehensile.kinematics.keyframe_timing import TimingConfig, keyframe_motion, time_keyframes
+from prehensile.kinematics.keyframes import Keyframe, pick_and_place_keyframes
 from prehensile.kinematics.poses import pose_distance
 from prehensile.kinematics.tree import tree_from_plant
 
@@ -265,8 +261,8 @@ def test_misuse_of_an_arm_is_named(tree):
     there = RigidTransform(X_WG.rotation(), X_WG.translation() + [0.0, 0.05, 0.0])
     frames = [Keyframe("here", X_WG), Keyframe("there", there)]
     for change, message in (
-        ({"velocity": np.full(7, np.inf), "acceleration": np.full(7, np.inf)}, "has no limit"),
-        ({"velocity": [1.0, 1.0]}, "^velocity"),
+        ({"limits": JointLimits.unlimited(7)}, "^limits: joint iiwa_joint_1 has none"),
+        ({"limits": JointLimits.unlimited(2)}, "^limits: expected those of 7 joints"),
         ({"q_nominal": np.full(7, np.nan)}, "^q_nominal"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -57,7 +57,7 @@ class PoseTrajectory:
     """The pose of a frame B in W over time, held before the start and after the end.
 
     Made by :func:`pose_trajectory`, :func:`blended_trajectory` or
-    :func:`~prehensile.kinematics.keyframes.time_keyframes`.
+    :func:`~prehensile.kinematics.keyframe_timing.time_keyframes`.
 
     Attributes:
         poses: X_0 ... X_L.
