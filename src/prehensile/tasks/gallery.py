@@ -68,7 +68,7 @@ class Followed:
             rad or m.
         follow_error: the same while it moved.
         end_error: the same at the end.
-        speed: greatest speed of a joint as a part of its limit.
+        speed: greatest speed of a joint as a part of its limit; 0 if the model states none.
         effort: greatest effort of a joint as a part of its limit.
         outside: how far a joint was out of its range, in rad or m; 0 if never.
         guard: the worst that the guard did with a command (name of a ``GuardStatus``).
@@ -331,7 +331,8 @@ def run_demo(show: Show, demo: str, *, browser: bool, out: Path) -> GalleryRepor
         table.add_column(column, justify="left" if column in ("robot", "limits") else "right")
     for r in report.robots:
         errors = (f"{1e3 * e:.2f}" for e in (r.hold_error, r.follow_error, r.end_error))
-        parts = (f"{100 * part:.0f} %" for part in (r.speed, r.effort))
+        # Nothing moves at exactly none of its limit: the model states no limit.
+        parts = (f"{100 * part:.0f} %" if part else "-" for part in (r.speed, r.effort))
         kept = "kept" if r.limits_kept else "broken"
         table.add_row(r.model, str(r.joints), *errors, *parts, kept)
     console.print(table)
