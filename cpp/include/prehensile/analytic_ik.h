@@ -122,7 +122,8 @@ struct ArmAngleChoice {
   std::array<double, 7> q;
 };
 
-/// What arms of all types have in common.
+/// What arms of all types have in common. All methods are const and may be called from many
+/// threads.
 class AnalyticArm {
  public:
   int num_joints() const { return n_; }

@@ -116,6 +116,8 @@ struct IkTaskRows {
 /// Whatever the tasks, v keeps the limits of velocity and acceleration exactly (but for rounding),
 /// and q + h v those of position, now and in all steps to come: every joint moves only so fast that
 /// it can still stop at the end of its range.
+///
+/// All methods are const and may be called from many threads.
 class DifferentialIk {
  public:
   /// @throws std::invalid_argument naming the argument.

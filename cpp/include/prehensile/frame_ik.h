@@ -28,6 +28,7 @@ struct FrameTask {
 };
 
 /// Differential inverse kinematics of frames of a tree, from joint state and desired poses.
+/// All methods are const and may be called from many threads.
 class FrameIk {
  public:
   /// @throws std::invalid_argument naming the argument.

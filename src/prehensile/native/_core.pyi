@@ -255,11 +255,11 @@ class ArmAngleChoice:
 class UrArm:
     def __init__(
         self,
-        axes: NDArray[np.float64],
-        points: NDArray[np.float64],
+        axes: ArrayLike,
+        points: ArrayLike,
         X_WG0: object,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
+        lower: ArrayLike,
+        upper: ArrayLike,
         tolerance: float = 1e-6,
     ) -> None: ...
     @property
@@ -275,7 +275,7 @@ class UrArm:
     ) -> IkSolutions: ...
     def solve_batch(
         self,
-        X_WG: NDArray[np.float64],
+        X_WG: ArrayLike,
         q_near: ArrayLike | None = None,
         limits: bool = True,
         num_threads: int = 1,
@@ -284,11 +284,11 @@ class UrArm:
 class PieperArm:
     def __init__(
         self,
-        axes: NDArray[np.float64],
-        points: NDArray[np.float64],
+        axes: ArrayLike,
+        points: ArrayLike,
         X_WG0: object,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
+        lower: ArrayLike,
+        upper: ArrayLike,
         tolerance: float = 1e-6,
     ) -> None: ...
     @property
@@ -304,7 +304,7 @@ class PieperArm:
     ) -> IkSolutions: ...
     def solve_batch(
         self,
-        X_WG: NDArray[np.float64],
+        X_WG: ArrayLike,
         q_near: ArrayLike | None = None,
         limits: bool = True,
         num_threads: int = 1,
@@ -313,11 +313,11 @@ class PieperArm:
 class SrsArm:
     def __init__(
         self,
-        axes: NDArray[np.float64],
-        points: NDArray[np.float64],
+        axes: ArrayLike,
+        points: ArrayLike,
         X_WG0: object,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
+        lower: ArrayLike,
+        upper: ArrayLike,
         tolerance: float = 1e-6,
     ) -> None: ...
     @property
@@ -337,8 +337,8 @@ class SrsArm:
     ) -> IkSolutions: ...
     def solve_batch(
         self,
-        X_WG: NDArray[np.float64],
-        psi: NDArray[np.float64],
+        X_WG: ArrayLike,
+        psi: ArrayLike,
         q_near: ArrayLike | None = None,
         limits: bool = True,
         num_threads: int = 1,
