@@ -60,6 +60,8 @@ def test_ctrl_c_leaves_a_whole_replay(tmp_path: Path) -> None:
         [sys.executable, "-m", "prehensile", "run", "pick_brick", "--no-browser",
          "--record", str(replay)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        # In a background job of a shell the interrupt is ignored, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:
