@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial import KDTree
-from synthetic_clouds import VOXEL, box_cloud, cylinder_cloud, joined, sphere_cloud
+from synthetic_clouds import VOXEL, box_cloud, cylinder_cloud, sphere_cloud
 
 from prehensile.errors import InputError
 from prehensile.grasping import (
@@ -22,13 +22,13 @@ from prehensile.grasping import (
     evaluate,
     select_grasps,
 )
-from prehensile.perception import Box, Cloud, convex_segments, downsample, inside_box
+from prehensile.perception import Box, PointCloud, convex_segments, downsample, inside_box, merge
 
 FLOOR = Box(RigidTransform([0.0, 0.0, -0.05]), np.array([2.0, 2.0, 0.1]))
 
 
 def select(
-    cloud: Cloud,
+    cloud: PointCloud,
     obstacles: Sequence[Box] = (FLOOR,),
     seed: int = 0,
     config: GraspConfig | None = None,
@@ -44,7 +44,7 @@ def axes(grasp: Grasp) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return R[:, 0], R[:, 1], grasp.X_WG.multiply(WSG50.p_GPad)
 
 
-def clutter(seed: int) -> Cloud:
+def clutter(seed: int) -> PointCloud:
     """Boxes and cylinders side by side in a small area, with the noise of a camera."""
     rng = np.random.default_rng(seed)
     clouds = []
@@ -55,8 +55,10 @@ def clutter(seed: int) -> Cloud:
             clouds.append(box_cloud([*rng.uniform(0.03, 0.08, 2), height], X))
         else:
             clouds.append(cylinder_cloud(rng.uniform(0.02, 0.04), height, X))
-    cloud = joined(clouds)
-    return Cloud(cloud.points + rng.normal(0, 0.0003, cloud.points.shape), cloud.normals)
+    cloud = merge(clouds)
+    return PointCloud(
+        cloud.points + rng.normal(0, 0.0003, cloud.points.shape), cloud.require_normals()
+    )
 
 
 def test_frames_are_rotations_that_start_from_the_seeds_normal() -> None:
@@ -71,9 +73,9 @@ def test_frames_are_rotations_that_start_from_the_seeds_normal() -> None:
     )
     np.testing.assert_allclose(np.linalg.det(R), 1.0, atol=1e-12)
     # Every closing axis is the normal of a point of the cloud, or the level part of one.
-    level = cloud.normals[np.abs(cloud.normals[:, 2]) < 0.99] * [1.0, 1.0, 0.0]
+    level = cloud.require_normals()[np.abs(cloud.require_normals()[:, 2]) < 0.99] * [1.0, 1.0, 0.0]
     level /= np.linalg.norm(level, axis=1, keepdims=True)
-    distance, _ = KDTree(np.concatenate([cloud.normals, level])).query(R[:, :, 0])
+    distance, _ = KDTree(np.concatenate([cloud.require_normals(), level])).query(R[:, :, 0])
     assert distance.max() < 1e-9
     # No approach is further from straight down than allowed; every seed has its steepest one.
     tilt = np.arccos(np.clip(-R[:, 2, 1], -1, 1))
@@ -188,17 +190,17 @@ def test_room_between_neighbours_is_used_and_no_more() -> None:
     boxes = [
         box_cloud([0.05, 0.1, 0.08], RigidTransform([x, 0, 0.04])) for x in (-0.085, 0.0, 0.085)
     ]
-    result = select(joined(boxes))  # 3.5 cm between them
+    result = select(merge(boxes))  # 3.5 cm between them
     middle = [g for g in result.grasps if abs(axes(g)[2][0]) < 0.02 and abs(axes(g)[0][0]) > 0.9]
     assert middle
     assert all(g.width < 0.066 for g in middle)
 
 
-def empty() -> Cloud:
-    return Cloud(np.zeros((0, 3)), np.zeros((0, 3)))
+def empty() -> PointCloud:
+    return PointCloud(np.zeros((0, 3)), np.zeros((0, 3)))
 
 
-def wedge() -> Cloud:
+def wedge() -> PointCloud:
     """A ridge of two faces that lean inward by 40 degrees each, down to the floor."""
     lean = np.deg2rad(40)
     u, v = np.meshgrid(np.arange(0, 0.155, 0.001), np.arange(-0.05, 0.05, 0.001))
@@ -207,8 +209,8 @@ def wedge() -> Cloud:
     for s in (-1.0, 1.0):
         p = np.column_stack([s * u * np.sin(lean), v, 0.12 - u * np.cos(lean)])
         normal = [s * np.cos(lean), 0.0, np.sin(lean)]
-        clouds.append(Cloud(p, np.tile(normal, (len(p), 1))))
-    return downsample(joined(clouds), VOXEL)
+        clouds.append(PointCloud(p, np.tile(normal, (len(p), 1))))
+    return downsample(merge(clouds), VOXEL)
 
 
 @pytest.mark.parametrize(
@@ -221,7 +223,7 @@ def wedge() -> Cloud:
         (box_cloud([0.05, 0.05, 0.08], RigidTransform([0, 0, 0.04])), GraspStatus.HITS_OBSTACLES),
     ],
 )
-def test_the_result_says_why_there_is_no_grasp(cloud: Cloud, status: GraspStatus) -> None:
+def test_the_result_says_why_there_is_no_grasp(cloud: PointCloud, status: GraspStatus) -> None:
     # A shaft of 9 cm: room for the narrow box, but not for a hand around it.
     walls = [
         Box(RigidTransform(p), np.array([0.05, 0.05, 0.3]) + 0.1 * np.abs([p[1], p[0], 0]) / 0.07)

@@ -9,12 +9,13 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from prehensile.errors import InputError
 from prehensile.perception import (
     Box,
-    Cloud,
+    PointCloud,
     convex_segments,
     crop,
     downsample,
     fuse_depth_images,
     inside_box,
+    merge,
     resting_pairs,
 )
 
@@ -53,7 +54,7 @@ def test_fused_cloud_of_a_sphere_lies_on_it_with_outward_normals() -> None:
     distance = np.linalg.norm(outward, axis=1)
     assert np.abs(distance - radius).max() < 0.001
     error = np.degrees(
-        np.arccos(np.clip(np.sum(outward * cloud.normals, axis=1) / distance, -1, 1))
+        np.arccos(np.clip(np.sum(outward * cloud.require_normals(), axis=1) / distance, -1, 1))
     )
     assert np.median(error) < 2
     assert error.max() < 15
@@ -89,7 +90,7 @@ def test_cropping_moves_with_the_box(rpy: tuple, p: tuple, seed: int) -> None:
     points_B = points_B[np.abs(np.abs(points_B) - size / 2).min(axis=1) > 1e-6]
     normals = np.tile([0.0, 0.0, 1.0], (len(points_B), 1))
     X_WB = RigidTransform(RollPitchYaw(*rpy), p)
-    cloud = Cloud(points_B, normals).transformed(X_WB)
+    cloud = PointCloud(points_B, normals).transformed(X_WB)
     kept = crop(cloud, Box(X_WB, size))
     expected = points_B[(np.abs(points_B) <= size / 2).all(axis=1)]
     np.testing.assert_allclose(X_WB.inverse().multiply(kept.points.T).T, expected, atol=1e-9)
@@ -103,12 +104,12 @@ def test_points_that_are_not_finite_are_in_no_box() -> None:
 def test_downsampling_drops_the_two_faces_of_a_thin_sheet() -> None:
     top, bottom = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
     points = np.array([[0.001, 0.001, 0.001], [0.001, 0.001, 0.002], [0.021, 0.001, 0.001]])
-    cloud = downsample(Cloud(points, np.stack([top, bottom, top])), 0.005)
+    cloud = downsample(PointCloud(points, np.stack([top, bottom, top])), 0.005)
     np.testing.assert_array_equal(cloud.points, points[2:])
-    np.testing.assert_array_equal(cloud.normals, [top])
+    np.testing.assert_array_equal(cloud.require_normals(), [top])
 
 
-def box_faces(size: np.ndarray, X: RigidTransform, voxel: float) -> Cloud:
+def box_faces(size: np.ndarray, X: RigidTransform, voxel: float) -> PointCloud:
     """The top and the four sides of a box, sampled densely, in voxels."""
     points, normals = [], []
     for axis in range(3):
@@ -121,7 +122,7 @@ def box_faces(size: np.ndarray, X: RigidTransform, voxel: float) -> Cloud:
             points.append(face)
             normals.append(np.zeros_like(face))
             normals[-1][:, axis] = sign
-    cloud = Cloud(np.concatenate(points), np.concatenate(normals)).transformed(X)
+    cloud = PointCloud(np.concatenate(points), np.concatenate(normals)).transformed(X)
     return downsample(cloud, voxel)
 
 
@@ -139,7 +140,9 @@ def test_boxes_that_touch_become_one_segment_each() -> None:
     # The camera does not see the part of the lower box's top that the upper one covers.
     X = parts[1][1]
     covered = (truth == 0) & inside_box(points, Box(X, parts[1][0] + [0, 0, 0.02]))
-    cloud = Cloud(points[~covered], np.concatenate([c.normals for c in clouds])[~covered])
+    cloud = PointCloud(
+        points[~covered], np.concatenate([c.require_normals() for c in clouds])[~covered]
+    )
     labels = convex_segments(cloud, voxel)
     truth = truth[~covered]
     for k in range(3):
@@ -155,9 +158,7 @@ def test_labels_are_ordered_by_size() -> None:
     voxel = 0.004
     big = box_faces(np.array([0.1, 0.1, 0.1]), RigidTransform([0.5, 0, 0]), voxel)
     small = box_faces(np.array([0.04, 0.04, 0.04]), RigidTransform(), voxel)
-    cloud = Cloud(
-        np.concatenate([small.points, big.points]), np.concatenate([small.normals, big.normals])
-    )
+    cloud = merge([small, big])
     labels = convex_segments(cloud, voxel)
     assert (labels[: len(small)] == 1).all()
     assert (labels[len(small) :] == 0).all()
@@ -166,13 +167,13 @@ def test_labels_are_ordered_by_size() -> None:
 def test_wrong_input_is_refused() -> None:
     points = np.zeros((2, 3))
     with pytest.raises(InputError, match="finite"):
-        Cloud(points, np.full((2, 3), np.nan))
+        PointCloud(points, np.full((2, 3), np.nan))
     with pytest.raises(InputError, match="shape"):
-        Cloud(points, np.zeros((3, 3)))
+        PointCloud(points, np.zeros((3, 3)))
     with pytest.raises(InputError, match="per camera"):
         fuse_depth_images([], [K], [], Box(RigidTransform(), np.ones(3)), 0.005)
     with pytest.raises(InputError, match="voxel_size"):
-        downsample(Cloud(points, np.tile([0.0, 0.0, 1.0], (2, 1))), 0.0)
+        downsample(PointCloud(points, np.tile([0.0, 0.0, 1.0], (2, 1))), 0.0)
 
 
 def test_what_stands_on_a_box_is_told_from_what_stands_beside_it() -> None:
@@ -181,9 +182,7 @@ def test_what_stands_on_a_box_is_told_from_what_stands_beside_it() -> None:
     above = box_faces(np.array([0.05, 0.05, 0.06]), RigidTransform([0, 0, 0.09]), voxel)
     beside = box_faces(np.array([0.06, 0.06, 0.1]), RigidTransform([0.09, 0, 0.05]), voxel)
     clouds = [base, above, beside]
-    cloud = Cloud(
-        np.concatenate([c.points for c in clouds]), np.concatenate([c.normals for c in clouds])
-    )
+    cloud = merge(clouds)
     labels = np.repeat(np.arange(3), [len(c) for c in clouds])
     resting = resting_pairs(cloud, labels, voxel)
     assert resting[0, 1] > 50  # 0.2 m of seam

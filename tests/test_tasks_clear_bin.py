@@ -14,7 +14,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.grasping import WSG50
-from prehensile.perception import Cloud
+from prehensile.perception import PointCloud
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.trajectory import time_parameterize
 from prehensile.station import load_scenario
@@ -110,7 +110,7 @@ def test_the_held_box_holds_the_piece_and_reaches_the_floor():
     grid = np.stack(np.meshgrid([-0.02, 0.02], np.linspace(-0.1, 0.1, 41)), axis=-1).reshape(-1, 2)
     p_G = np.column_stack([grid[:, 0], np.full(len(grid), WSG50.p_GPad[1]), grid[:, 1]])
     normals = np.tile([0.0, 0.0, 1.0], (len(p_G), 1))
-    cloud = Cloud(X_WG.multiply(p_G.T).T, normals)
+    cloud = PointCloud(X_WG.multiply(p_G.T).T, normals)
     floor = 0.03
     box = held_box(cloud, np.zeros(len(p_G), int), X_WG, 0.04, WSG50, floor)
     low = box.X_WB.translation() - box.size / 2

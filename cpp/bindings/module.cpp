@@ -13,4 +13,18 @@ NB_MODULE(_core, m) {
   prehensile::BindReachability(m);
   prehensile::BindDifferentialIk(m);
   prehensile::BindAnalyticIk(m);
+  prehensile::BindDepthFusion(m);
+  prehensile::BindKdTree(m);
+  prehensile::BindSurface(m);
+  prehensile::BindCloudNormals(m);
+  prehensile::BindSampling(m);
+  prehensile::BindRegions(m);
+  prehensile::BindVolumes(m);
+  prehensile::BindDistanceField(m);
+  prehensile::BindIcp(m);
+  prehensile::BindPointDrift(m);
+  prehensile::BindConsensus(m);
+  prehensile::BindBranchAndBound(m);
+  prehensile::BindFeatures(m);
+  prehensile::BindTracking(m);
 }

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from prehensile.grasping.grasp import GraspConfig
-from prehensile.perception.cloud import Cloud
+from prehensile.perception.cloud import PointCloud
 
 # Normals that lean no more than this count as level [rad].
 _LEVEL = np.deg2rad(8)
@@ -38,7 +38,7 @@ class Candidates:
 
 
 def antipodal_candidates(
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: NDArray[np.int64],
     rng: np.random.Generator,
     config: GraspConfig,
@@ -63,7 +63,7 @@ def antipodal_candidates(
         Candidates, those of one seed in succession; at most one set per usable point.
     """
     # The least tilt of a direction perpendicular to n is the angle of n to the horizontal plane.
-    usable = np.nonzero(np.abs(cloud.normals[:, 2]) < np.sin(config.max_tilt))[0]
+    usable = np.nonzero(np.abs(cloud.require_normals()[:, 2]) < np.sin(config.max_tilt))[0]
     if len(usable) == 0:
         none = np.zeros(0, dtype=np.int64)
         return Candidates(np.zeros((0, 3, 3)), np.zeros((0, 3)), none, none)
@@ -75,7 +75,7 @@ def antipodal_candidates(
         replace=False,
         p=weight / weight.sum(),
     )
-    axes = cloud.normals[seeds]
+    axes = cloud.require_normals()[seeds]
     leaning = np.abs(axes[:, 2]) > np.sin(_LEVEL)
     order = np.argsort(np.append(np.arange(len(seeds)), np.nonzero(leaning)[0]), kind="stable")
     seeds = np.concatenate([seeds, seeds[leaning]])[order]
@@ -92,7 +92,7 @@ def antipodal_candidates(
     z = cos * R_W0[:, None, :, 2] - sin * R_W0[:, None, :, 1]
     R_WP = np.broadcast_to(np.stack([x, y, z], axis=-1)[:, :, None], (S, A, D, 3, 3))
     # A little inside the surface, so that the seed is between the pads whatever the rounding.
-    inside = cloud.points[seeds] - 0.5 * config.voxel_size * cloud.normals[seeds]
+    inside = cloud.points[seeds] - 0.5 * config.voxel_size * cloud.require_normals()[seeds]
     p_WP = inside[:, None, None] + depths[:, None] * y[:, :, None]
     of_seed = np.repeat(np.arange(S), A * D)
     candidates = Candidates(

@@ -18,7 +18,7 @@ from prehensile.grasping.collision import hand_hits_boxes, hand_hits_points
 from prehensile.grasping.columns import columns, largest, room_beside
 from prehensile.grasping.grasp import GraspConfig, GraspStatus
 from prehensile.grasping.gripper import ParallelGripper
-from prehensile.perception.cloud import Box, Cloud
+from prehensile.perception.cloud import Box, PointCloud
 from prehensile.perception.segmentation import resting_pairs
 
 # An object narrower than this [m] must be seen from both sides: what looks like free space behind
@@ -81,7 +81,7 @@ class Evaluation:
 
 def evaluate(
     candidates: Candidates,
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: NDArray[np.int64],
     gripper: ParallelGripper,
     obstacles: Sequence[Box],
@@ -162,7 +162,7 @@ def _places(
     return np.split(rows, np.nonzero(np.diff(seed[rows]))[0] + 1) if len(rows) else []
 
 
-def _segment_centres(cloud: Cloud, segments: NDArray[np.int64]) -> NDArray[np.float64]:
+def _segment_centres(cloud: PointCloud, segments: NDArray[np.int64]) -> NDArray[np.float64]:
     """(L, 3) the mean point of each label 0..L-1."""
     labelled = segments >= 0
     if not labelled.any():
@@ -175,7 +175,7 @@ def _segment_centres(cloud: Cloud, segments: NDArray[np.int64]) -> NDArray[np.fl
 def _evaluate_columns(
     candidates: Candidates,
     rows: NDArray[np.int64],
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: NDArray[np.int64],
     centres: NDArray[np.float64],
     burdens: NDArray[np.float64],
@@ -204,7 +204,7 @@ def _evaluate_columns(
     pad_half = 0.5 * (gripper.pad_y[1] - gripper.pad_y[0])
     at_pads = between & (np.abs(y) <= pad_half) & (np.abs(z) <= 0.5 * gripper.pad_width)
     k, n_pad, x_pad = i[at_pads], n[at_pads], x[at_pads]
-    normals = cloud.normals[n_pad]
+    normals = cloud.require_normals()[n_pad]
     normal_x = np.sum(R[k, :, 0] * normals, axis=1)
     beside = np.sum(R[k, :, 1] * normals, axis=1) > -_FACES_PALM
     with np.errstate(invalid="ignore"):

@@ -12,12 +12,12 @@ from prehensile.grasping.candidates import Candidates, antipodal_candidates
 from prehensile.grasping.grasp import Grasp, GraspConfig, GraspResult, GraspStatus
 from prehensile.grasping.gripper import ParallelGripper
 from prehensile.grasping.scoring import Evaluation, evaluate
-from prehensile.perception.cloud import Box, Cloud
+from prehensile.perception.cloud import Box, PointCloud
 from prehensile.perception.segmentation import convex_segments
 
 
 def select_grasps(
-    cloud: Cloud,
+    cloud: PointCloud,
     gripper: ParallelGripper,
     obstacles: Sequence[Box],
     config: GraspConfig,
@@ -66,7 +66,7 @@ def select_grasps(
 def _polished(
     candidates: Candidates,
     evaluation: Evaluation,
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: NDArray[np.int64],
     gripper: ParallelGripper,
     obstacles: Sequence[Box],

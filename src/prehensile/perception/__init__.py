@@ -1,18 +1,19 @@
 """From images to clouds: unprojection, normals, cropping, fusion, segmentation."""
 
-from prehensile.perception.cloud import Box, Cloud, crop, inside_box
+from prehensile.perception.cloud import Box, PointCloud, crop, inside_box, merge
 from prehensile.perception.depth import normals_from_depth, unproject
 from prehensile.perception.fusion import downsample, fuse_depth_images
 from prehensile.perception.segmentation import convex_segments, resting_pairs
 
 __all__ = [
     "Box",
-    "Cloud",
+    "PointCloud",
     "convex_segments",
     "crop",
     "downsample",
     "fuse_depth_images",
     "inside_box",
+    "merge",
     "normals_from_depth",
     "resting_pairs",
     "unproject",

@@ -1,7 +1,8 @@
-"""Point clouds with normals, and boxes that cut them."""
+"""Point clouds, and boxes that cut them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,34 +23,53 @@ class Box(NamedTuple):
     size: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Cloud:
-    """Points with unit normals, all in one frame; row i of each array is one point.
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points and what is known of each, all in one frame; row i of each array is point i.
+
+    Whatever array-like is given becomes an array of the type below.
 
     Attributes:
-        points: (N, 3) positions [m].
-        normals: (N, 3) unit normals, pointing out of the surface.
+        points: (N, 3) positions [m], finite.
+        normals: (N, 3) unit normals, pointing out of the surface; None if not known. Zero where a
+            single one is not known.
+        colors: (N, 3) uint8 red, green, blue; None if not known.
+        labels: (N,) int64 to which segment or object each belongs, -1 for none; None if not known.
+        sensor_origins: (N, 3) where the sensor was that saw each point [m]; one position (3,) may
+            be given for all. None if not known.
     """
 
     points: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    normals: NDArray[np.float64] | None = None
+    colors: NDArray[np.uint8] | None = None
+    labels: NDArray[np.int64] | None = None
+    sensor_origins: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        """Checks shapes and finiteness.
+        """Converts the arrays and checks them.
 
         Raises:
-            InputError: if the shapes disagree or a value is not finite.
+            InputError: if shapes disagree or a number is not finite.
         """
-        fields = {"points": self.points, "normals": self.normals}
-        faults = [
-            f"{name} has shape {value.shape}; expected ({len(self.points)}, 3)"
-            for name, value in fields.items()
-            if value.shape != (len(self.points), 3)
-        ] + [
-            f"{name} holds values that are not finite"
-            for name, value in fields.items()
-            if not np.isfinite(value).all()
-        ]
+        count = len(np.atleast_1d(np.asarray(self.points)))
+        faults = []
+        for name, dtype, shape in _FIELDS:
+            value = getattr(self, name)
+            if value is None and name != "points":
+                continue
+            expected = (count, *shape)
+            try:
+                array = _converted(value, dtype)
+            except (TypeError, ValueError, OverflowError) as error:
+                faults.append(f"{name} cannot be an array of {np.dtype(dtype)}: {error}")
+                continue
+            if name == "sensor_origins" and array.shape == (3,):
+                array = np.broadcast_to(array, expected)
+            if array.shape != expected:
+                faults.append(f"{name} has shape {array.shape}; expected {expected}")
+            elif not np.isfinite(array).all():
+                faults.append(f"{name} holds values that are not finite")
+            object.__setattr__(self, name, array)
         if faults:
             raise InputError(*faults)
 
@@ -57,14 +77,86 @@ class Cloud:
         """The number of points."""
         return len(self.points)
 
-    def select(self, index: NDArray[np.bool_] | NDArray[np.int64]) -> "Cloud":
-        """The cloud of the points chosen by a mask (N,) or by indices (M,)."""
-        return Cloud(self.points[index], self.normals[index])
+    def require_normals(self) -> NDArray[np.float64]:
+        """The normals (N, 3).
 
-    def transformed(self, X_AB: RigidTransform) -> "Cloud":
+        Raises:
+            InputError: if the cloud has none.
+        """
+        if self.normals is None:
+            raise InputError("the cloud has no normals; estimate them first")
+        return self.normals
+
+    def require_sensor_origins(self) -> NDArray[np.float64]:
+        """Where the sensor was that saw each point, (N, 3).
+
+        Raises:
+            InputError: if the cloud does not know.
+        """
+        if self.sensor_origins is None:
+            raise InputError("the cloud has no sensor_origins; give the position of its camera")
+        return self.sensor_origins
+
+    def replace(self, **fields: Any) -> "PointCloud":
+        """This cloud with some fields replaced, by name."""
+        own = {name: getattr(self, name) for name, _, _ in _FIELDS}
+        return PointCloud(**{**own, **fields})
+
+    def select(self, index: NDArray[np.bool_] | NDArray[np.integer]) -> "PointCloud":
+        """The cloud of the points chosen by a mask (N,) or by indices (M,)."""
+        known = {name: getattr(self, name) for name, _, _ in _FIELDS}
+        return PointCloud(**{name: v[index] for name, v in known.items() if v is not None})
+
+    def transformed(self, X_AB: RigidTransform) -> "PointCloud":
         """This cloud, given in B, expressed in A."""
         R_AB = np.asarray(X_AB.rotation().matrix(), dtype=float)
-        return Cloud(rotate(self.points, R_AB) + X_AB.translation(), rotate(self.normals, R_AB))
+        p_AB = X_AB.translation()
+        return self.replace(
+            points=rotate(self.points, R_AB) + p_AB,
+            normals=None if self.normals is None else rotate(self.normals, R_AB),
+            sensor_origins=None
+            if self.sensor_origins is None
+            else rotate(self.sensor_origins, R_AB) + p_AB,
+        )
+
+
+_FIELDS: tuple[tuple[str, Any, tuple[int, ...]], ...] = (
+    ("points", np.float64, (3,)),
+    ("normals", np.float64, (3,)),
+    ("colors", np.uint8, (3,)),
+    ("labels", np.int64, ()),
+    ("sensor_origins", np.float64, (3,)),
+)
+
+
+def _converted(value: Any, dtype: Any) -> NDArray[Any]:
+    """The value as an array of a type, refusing what would lose its meaning."""
+    array = np.asarray(value)
+    if np.issubdtype(dtype, np.integer) and array.size:
+        if not np.issubdtype(array.dtype, np.integer):
+            raise TypeError(f"its values are {array.dtype}")
+        info = np.iinfo(dtype)
+        if array.min() < info.min or array.max() > info.max:
+            raise OverflowError(f"values outside {info.min} to {info.max}")
+    elif np.iscomplexobj(array):
+        raise TypeError(f"its values are {array.dtype}")
+    return np.asarray(array, dtype=dtype)
+
+
+def merge(clouds: Sequence[PointCloud]) -> PointCloud:
+    """All points of several clouds of one frame, in order.
+
+    A field stays if every cloud that holds a point has it. To bring views of calibrated cameras
+    into one frame first, see :meth:`PointCloud.transformed`.
+    """
+    clouds = [c for c in clouds if len(c)]
+    if not clouds:
+        return PointCloud(np.zeros((0, 3)))
+    fields = {}
+    for name, _, _ in _FIELDS:
+        values = [getattr(c, name) for c in clouds]
+        fields[name] = None if any(v is None for v in values) else np.concatenate(values)
+    return PointCloud(**fields)
 
 
 def rotate(vectors: NDArray[np.floating], R: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -95,6 +187,6 @@ def inside_box(points: NDArray[np.floating], box: Box) -> NDArray[np.bool_]:
     return inside
 
 
-def crop(cloud: Cloud, box: Box) -> Cloud:
+def crop(cloud: PointCloud, box: Box) -> PointCloud:
     """The points of the cloud inside or on the box (both in the same frame), in order."""
     return cloud.select(inside_box(cloud.points, box))

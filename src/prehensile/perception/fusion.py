@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 
 from prehensile.errors import InputError
 from prehensile.native import voxel_downsample
-from prehensile.perception.cloud import Box, Cloud, inside_box, rotate
+from prehensile.perception.cloud import Box, PointCloud, inside_box, rotate
 from prehensile.perception.depth import normals_from_depth, unproject
 
 
@@ -20,7 +20,7 @@ def fuse_depth_images(
     voxel_size: float,
     *,
     num_threads: int = 1,
-) -> Cloud:
+) -> PointCloud:
     """One cloud of what several depth cameras see inside a box.
 
     Normals are made in each image, from its own pixel grid and toward its own camera, before the
@@ -55,11 +55,11 @@ def fuse_depth_images(
         R_WC = np.asarray(X_WC.rotation().matrix(), dtype=float)
         points.append(rotate(p_C[keep], R_WC) + X_WC.translation())
         normals.append(rotate(normals_C[keep], R_WC))
-    cloud = Cloud(np.concatenate(points), np.concatenate(normals))
+    cloud = PointCloud(np.concatenate(points), np.concatenate(normals))
     return downsample(cloud, voxel_size, num_threads=num_threads)
 
 
-def downsample(cloud: Cloud, voxel_size: float, *, num_threads: int = 1) -> Cloud:
+def downsample(cloud: PointCloud, voxel_size: float, *, num_threads: int = 1) -> PointCloud:
     """One point per occupied voxel: the mean of its points and of its normals.
 
     Voxels are the cells of the grid through the origin, in the order in which the cloud's points
@@ -81,7 +81,7 @@ def downsample(cloud: Cloud, voxel_size: float, *, num_threads: int = 1) -> Clou
         raise InputError(str(error)) from None
     normals = np.asarray(voxels.normals, dtype=float)
     seen = normals.any(axis=1)
-    return Cloud(np.asarray(voxels.points, dtype=float)[seen], normals[seen])
+    return PointCloud(np.asarray(voxels.points, dtype=float)[seen], normals[seen])
 
 
 def _region_of_interest(

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from prehensile.perception.cloud import Cloud
+from prehensile.perception.cloud import PointCloud
 
 
 def convex_segments(
-    cloud: Cloud,
+    cloud: PointCloud,
     voxel_size: float,
     *,
     max_concavity: float = np.deg2rad(10.0),
@@ -40,7 +40,7 @@ def convex_segments(
         return np.zeros(0, dtype=np.int64)
     i, j = _adjacent_pairs(cloud.points, voxel_size)
     d = cloud.points[j] - cloud.points[i]
-    n_i, n_j = cloud.normals[i], cloud.normals[j]
+    n_i, n_j = cloud.require_normals()[i], cloud.require_normals()[j]
     turn = n_j - n_i
     angle = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(turn, axis=1), 1.0))
     # Convex: going from i to j the normal leans forward, so turn . d >= 0. Points of adjacent
@@ -70,7 +70,9 @@ def convex_segments(
     return labels
 
 
-def resting_pairs(cloud: Cloud, labels: NDArray[np.int64], voxel_size: float) -> NDArray[np.int64]:
+def resting_pairs(
+    cloud: PointCloud, labels: NDArray[np.int64], voxel_size: float
+) -> NDArray[np.int64]:
     """How much of each segment is seen to lie under each other one.
 
     Where something stands or leans on a surface, a patch that faces upward meets one that does
@@ -90,7 +92,7 @@ def resting_pairs(cloud: Cloud, labels: NDArray[np.int64], voxel_size: float) ->
         return result
     i, j = _adjacent_pairs(cloud.points, voxel_size)
     i, j = np.concatenate([i, j]), np.concatenate([j, i])
-    up = cloud.normals[:, 2]
+    up = cloud.require_normals()[:, 2]
     on = (
         (labels[i] != labels[j])
         & (labels[i] >= 0)

@@ -20,7 +20,7 @@ from prehensile.grasping import (
     ParallelGripper,
     select_grasps,
 )
-from prehensile.perception import Cloud, convex_segments, fuse_depth_images
+from prehensile.perception import PointCloud, convex_segments, fuse_depth_images
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.obstacles import HeightMap
 from prehensile.planning.pick import (
@@ -272,7 +272,7 @@ class ClearBin:
         pick = Pick(attempt, plan.lift, place.carry)
         return Decision("pick", dc.replace(memory, pick=pick, q=plan.approach.q_end), motion)
 
-    def _see(self, senses: Senses) -> Cloud:
+    def _see(self, senses: Senses) -> PointCloud:
         """What the cameras see in the first bin, without its floor and walls."""
         return fuse_depth_images(
             [senses.image(f"{c.name}.depth_image").data[:, :, 0] for c in self._cameras],
@@ -292,7 +292,7 @@ class ClearBin:
         return sorted(grasps, key=tried)
 
     def _nudge(
-        self, memory: Memory, cloud: Cloud, segments: np.ndarray, rng: np.random.Generator
+        self, memory: Memory, cloud: PointCloud, segments: np.ndarray, rng: np.random.Generator
     ) -> Decision:
         """Nothing can be picked as it lies: moves something, then goes home and looks again."""
         config = self.config

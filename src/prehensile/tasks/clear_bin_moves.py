@@ -9,7 +9,7 @@ from pydrake import geometry
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.grasping import ParallelGripper
-from prehensile.perception import Box, Cloud
+from prehensile.perception import Box, PointCloud
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import plan_cartesian
 from prehensile.planning.pick import MoveOptions, PlacePlan, drop_poses, plan_pick, plan_place
@@ -57,7 +57,7 @@ class BinGeometry:
 
 
 def held_box(
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: np.ndarray,
     X_WG: RigidTransform,
     span: float,
@@ -168,7 +168,7 @@ class NudgePlan:
 def plan_nudge(
     arm: ArmModel,
     q_start: np.ndarray,
-    cloud: Cloud,
+    cloud: PointCloud,
     segments: np.ndarray,
     pick: BinGeometry,
     gripper: ParallelGripper,
@@ -194,7 +194,7 @@ def plan_nudge(
     Returns:
         The plan; None if no piece can be reached.
     """
-    upward = (segments >= 0) & (cloud.normals[:, 2] > 0.8)
+    upward = (segments >= 0) & (cloud.require_normals()[:, 2] > 0.8)
     pieces, areas = np.unique(segments[upward], return_counts=True)
     if len(pieces) == 0:
         return None
