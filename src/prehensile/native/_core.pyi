@@ -14,6 +14,12 @@ def voxel_downsample(
     simd: str | None = None,
 ) -> tuple[NDArray[np.floating], NDArray[np.floating] | None, NDArray[np.int32]]: ...
 def simd_levels() -> list[str]: ...
+def inside_box(
+    points: NDArray[np.floating], X_BW: ArrayLike, size: ArrayLike
+) -> NDArray[np.uint8]: ...
+def inside_half_space(
+    points: NDArray[np.floating], normal: ArrayLike, offset: float
+) -> NDArray[np.uint8]: ...
 
 class KinematicTree:
     """Forward kinematics of a tree of n joints, revolute or prismatic, and of frames fixed to it.
@@ -343,3 +349,14 @@ class SrsArm:
         limits: bool = True,
         num_threads: int = 1,
     ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]: ...
+
+class KdTree:
+    def __init__(self, points: ArrayLike) -> None: ...
+    def __len__(self) -> int: ...
+    def nearest(
+        self, queries: ArrayLike, k: int, max_distance: float, num_threads: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]: ...
+    def within_radius(
+        self, queries: ArrayLike, radius: float, num_threads: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+        """Number for each query; indices and distances of all."""
