@@ -10,6 +10,7 @@ void BindKinematicTree(nanobind::module_& m);
 void BindReachability(nanobind::module_& m);
 void BindDifferentialIk(nanobind::module_& m);
 void BindAnalyticIk(nanobind::module_& m);
+void BindCrop(nanobind::module_& m);
 void BindDepthFusion(nanobind::module_& m);
 void BindKdTree(nanobind::module_& m);
 void BindSurface(nanobind::module_& m);

@@ -13,6 +13,7 @@ NB_MODULE(_core, m) {
   prehensile::BindReachability(m);
   prehensile::BindDifferentialIk(m);
   prehensile::BindAnalyticIk(m);
+  prehensile::BindCrop(m);
   prehensile::BindDepthFusion(m);
   prehensile::BindKdTree(m);
   prehensile::BindSurface(m);

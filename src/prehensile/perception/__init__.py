@@ -1,6 +1,6 @@
 """From images to clouds: unprojection, normals, cropping, fusion, segmentation."""
 
-from prehensile.perception.cloud import Box, PointCloud, crop, inside_box, merge
+from prehensile.perception.cloud import Box, PointCloud, crop, inside_box, inside_half_space, merge
 from prehensile.perception.depth import normals_from_depth, unproject
 from prehensile.perception.fusion import downsample, fuse_depth_images
 from prehensile.perception.segmentation import convex_segments, resting_pairs
@@ -13,6 +13,7 @@ __all__ = [
     "downsample",
     "fuse_depth_images",
     "inside_box",
+    "inside_half_space",
     "merge",
     "normals_from_depth",
     "resting_pairs",

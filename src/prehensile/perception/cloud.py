@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
 
 from prehensile.errors import InputError
+from prehensile.native import _core
 
 
 class Box(NamedTuple):
@@ -175,18 +176,46 @@ def inside_box(points: NDArray[np.floating], box: Box) -> NDArray[np.bool_]:
     """Which points (..., 3) in W lie inside or on the box: a mask (...).
 
     A point with a coordinate that is not finite is outside.
+
+    Raises:
+        ValueError: if the shape is wrong, or the box's size is not three finite numbers.
     """
-    X_BW = box.X_WB.inverse()
-    R_BW, p_BW = X_BW.rotation().matrix(), X_BW.translation()
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    inside = np.ones(points.shape[:-1], dtype=bool)
-    with np.errstate(invalid="ignore"):
-        for k in range(3):
-            p_k = R_BW[k, 0] * x + R_BW[k, 1] * y + R_BW[k, 2] * z + p_BW[k]
-            inside &= np.abs(p_k) <= 0.5 * box.size[k]
-    return inside
+    rows = _rows(points)
+    mask = _core.inside_box(rows, box.X_WB.inverse().GetAsMatrix4(), box.size)
+    return mask.view(np.bool_).reshape(points.shape[:-1])
+
+
+def inside_half_space(
+    points: NDArray[np.floating], normal: ArrayLike, offset: float
+) -> NDArray[np.bool_]:
+    """Which points p (..., 3) have normal . p >= offset: a mask (...).
+
+    A point with a coordinate that is not finite has not.
+
+    Args:
+        points: (..., 3) positions [m].
+        normal: (3,) normal of the plane, pointing into the half-space that is meant.
+        offset: the plane's distance from the origin along the normal, times its length [m].
+
+    Raises:
+        ValueError: if a shape is wrong or normal or offset is not finite.
+    """
+    mask = _core.inside_half_space(_rows(points), normal, offset)
+    return mask.view(np.bool_).reshape(points.shape[:-1])
 
 
 def crop(cloud: PointCloud, box: Box) -> PointCloud:
-    """The points of the cloud inside or on the box (both in the same frame), in order."""
+    """The points of the cloud inside or on the box (both in the same frame), in order.
+
+    A crop by pose is one by the box's ``X_WB``.
+    """
     return cloud.select(inside_box(cloud.points, box))
+
+
+def _rows(points: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Points (..., 3) as contiguous rows of float32 or float64."""
+    array = np.asarray(points)
+    if array.ndim < 1 or array.shape[-1] != 3:
+        raise ValueError(f"points: expected shape (..., 3), not {array.shape}")
+    dtype = array.dtype if array.dtype in (np.float32, np.float64) else np.float64
+    return np.ascontiguousarray(array.reshape(-1, 3), dtype=dtype)
