@@ -39,6 +39,8 @@ from pydrake.systems.framework import (
 from pydrake.systems.sensors import CameraConfig, PixelType, RgbdSensor
 
 from prehensile.errors import Finding, InputError
+from prehensile.perception.depth_noise import DepthNoiseConfig
+from prehensile.perception.depth_noise_system import DepthNoise
 from prehensile.station.scenario import Scenario
 
 
@@ -99,7 +101,9 @@ def add_cameras(
     (ImageDepth32F, metres along the optical axis; 0 too near, infinity too far),
     ``NAME.label_image`` (ImageLabel16I), ``NAME.point_cloud`` (points in W, with colours if the
     camera has ``rgb``) and ``NAME.X_WC`` (RigidTransform). All of them are computed on demand;
-    the settings ``fps``, ``capture_offset``, ``output_delay`` and ``lcm_bus`` are those of
+    of a camera under the scenario's ``depth_noise``, depth image and point cloud are noisy
+    (:mod:`prehensile.perception.depth_noise`), and ``cheat.NAME.depth_image`` is the true one. The
+    settings ``fps``, ``capture_offset``, ``output_delay`` and ``lcm_bus`` are those of
     Drake's own cameras and have no use here.
 
     Args:
@@ -123,15 +127,21 @@ def add_cameras(
         if not visible.HasRenderer(config.renderer_name):
             visible.AddRenderer(config.renderer_name, _make_renderer(scenario, key))
         sensor = add_sensor(scenario, key, inside, plant, visible)
+        depth = sensor.depth_image_32F_output_port()
+        noise = scenario.depth_noise.get(key)
+        if noise is not None:
+            inside.ExportOutput(depth, f"cheat.{config.name}.depth_image")
+            depth = _add_noise(inside, config, noise, sensor)
         add_camera_ports(
             inside,
             config,
             rgb=sensor.color_image_output_port(),
-            depth=sensor.depth_image_32F_output_port(),
+            depth=depth,
             label=sensor.label_image_output_port(),
             pose=sensor.body_pose_in_world_output_port(),
         )
-    cameras = builder.AddNamedSystem("cameras", Cameras(inside.Build()))
+    timed = bool(scenario.depth_noise)
+    cameras = builder.AddNamedSystem("cameras", Cameras(inside.Build(), timed=timed))
     builder.Connect(plant.get_geometry_pose_output_port(), cameras.get_input_port())
     for i in range(cameras.num_output_ports()):
         port = cameras.get_output_port(i)
@@ -149,10 +159,12 @@ class Cameras(LeafSystem):
 
     Args:
         inside: scene graph, sensors and converters; one input port, for the poses.
+        timed: whether the outputs depend on the time too, as noise does.
     """
 
-    def __init__(self, inside: Diagram) -> None:
+    def __init__(self, inside: Diagram, *, timed: bool = False) -> None:
         super().__init__()
+        self._timed = timed
         self._inside, self._context = inside, inside.CreateDefaultContext()
         scene_graph = inside.GetSubsystemByName("scene_graph")
         assert isinstance(scene_graph, SceneGraph)
@@ -162,13 +174,14 @@ class Cameras(LeafSystem):
         self._poses = self.DeclareAbstractInputPort(
             "geometry_pose", inside.get_input_port().Allocate()
         )
+        needed = {self._poses.ticket()} | ({self.time_ticket()} if timed else set())
         for i in range(inside.num_output_ports()):
             port = inside.get_output_port(i)
             self.DeclareAbstractOutputPort(
                 port.get_name(),
                 port.Allocate,
                 partial(self._calc, port),
-                prerequisites_of_calc={self._poses.ticket()},
+                prerequisites_of_calc=needed,
             )
 
     def _calc(self, port: OutputPort, context: Context, value: AbstractValue) -> None:
@@ -178,6 +191,8 @@ class Cameras(LeafSystem):
         if key != self._key:
             self._inside.get_input_port().FixValue(self._context, AbstractValue.Make(poses))
             self._key = key
+        if self._timed:
+            self._context.SetTime(context.get_time())
         value.set_value(port.Eval(self._context))
 
 
@@ -234,6 +249,28 @@ def add_sensor(
     return sensor
 
 
+def _add_noise(
+    builder: DiagramBuilder, config: CameraConfig, noise: DepthNoiseConfig, sensor: RgbdSensor
+) -> OutputPort:
+    """The port of the noisy depth image of a camera."""
+    _, depth_camera = config.MakeCameras()
+    system = builder.AddNamedSystem(
+        f"{config.name}.depth_noise",
+        DepthNoise(depth_camera.core().intrinsics().intrinsic_matrix(), noise),
+    )
+    depth_input, color_input = system.get_input_port(0), system.get_input_port(1)
+    builder.Connect(sensor.depth_image_32F_output_port(), depth_input)
+    if _aligned(config) and config.rgb:
+        builder.Connect(sensor.color_image_output_port(), color_input)
+    return system.get_output_port()
+
+
+def _aligned(config: CameraConfig) -> bool:
+    """Whether depth and colour share their frame, and so their pixels."""
+    X_BC, X_BD = config.X_BC, config.X_BD
+    return X_BC.GetDeterministicValue().IsExactlyEqualTo(X_BD.GetDeterministicValue())
+
+
 def add_camera_ports(
     builder: DiagramBuilder,
     config: CameraConfig,
@@ -254,11 +291,7 @@ def add_camera_ports(
         pose: port of X_WC.
     """
     _, depth_camera = config.MakeCameras()
-    # Depth and colour share their pixels only where they share their frame.
-    aligned = config.X_BC.GetDeterministicValue().IsExactlyEqualTo(
-        config.X_BD.GetDeterministicValue()
-    )
-    colored = config.rgb and aligned
+    colored = config.rgb and _aligned(config)
     cloud = builder.AddNamedSystem(
         f"{config.name}.to_point_cloud",
         DepthImageToPointCloud(

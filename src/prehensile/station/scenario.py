@@ -18,6 +18,8 @@ from pydrake.systems.analysis import SimulatorConfig
 from pydrake.systems.sensors import CameraConfig
 from pydrake.visualization import VisualizationConfig
 
+from prehensile.perception.depth_noise import DepthNoiseConfig
+
 
 def _simulator_config() -> SimulatorConfig:
     return SimulatorConfig(
@@ -41,6 +43,8 @@ class Scenario:
             driver registry (:mod:`prehensile.station.drivers`) holds for its YAML tag.
         cameras: Drake's camera settings by key.
         camera_ids: serial numbers of the real cameras by the same keys (hardware only).
+        depth_noise: our key: what the depth images of simulated cameras get wrong, by the cameras'
+            keys; a camera that is not named is ideal (simulation only).
         visualization: Drake's visualization settings.
         packages: our key: further model folders, package name to absolute path.
         file: where it was read from (None if it was made in Python).
@@ -58,6 +62,7 @@ class Scenario:
     model_drivers: dict[str, Any] = dc.field(default_factory=dict)
     cameras: dict[str, CameraConfig] = dc.field(default_factory=dict)
     camera_ids: dict[str, str] = dc.field(default_factory=dict)
+    depth_noise: dict[str, DepthNoiseConfig] = dc.field(default_factory=dict)
     visualization: VisualizationConfig = dc.field(default_factory=VisualizationConfig)
     packages: dict[str, str] = dc.field(default_factory=dict)
     file: Path | None = None

@@ -116,10 +116,18 @@ def _check_cameras(
         focal = camera.get("focal")
         if focal is not None and isinstance(focal.value, dict) and not focal.value:
             findings.append(focal.finding("the focal length is empty", "give x, y, or both"))
-    for key, node in children(root.get("camera_ids")).items():
-        if key not in children(root.get("cameras")):
-            mend = close_to(key, children(root.get("cameras")))
-            findings.append(node.finding(f"there is no camera '{key}'", mend))
+    for section in ("camera_ids", "depth_noise"):
+        for key, node in children(root.get(section)).items():
+            if key not in children(root.get("cameras")):
+                mend = close_to(key, children(root.get("cameras")))
+                findings.append(node.finding(f"there is no camera '{key}'", mend))
+    for noise in children(root.get("depth_noise")).values():
+        near, far = _value(noise, "min_depth", 0.3), _value(noise, "max_depth", 1.5)
+        if near >= far:
+            node = noise.get("min_depth") or noise.get("max_depth") or noise
+            findings.append(
+                node.finding(f"min_depth {near:g} is not less than max_depth {far:g}", "swap them")
+            )
 
 
 def _check_bus(node: Node, buses: set[str], findings: list[Finding]) -> None:
