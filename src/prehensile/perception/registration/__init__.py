@@ -1,5 +1,7 @@
 """Poses of known objects in clouds: every method answers with a :class:`RegistrationResult`."""
 
+from prehensile.perception.registration.constraints import HalfSpaces, fit_rigid_constrained
+from prehensile.perception.registration.convex_constraints import ConvexFit, fit_rigid_convex
 from prehensile.perception.registration.known import (
     RigidFit,
     fit_rigid,
@@ -14,11 +16,15 @@ from prehensile.perception.registration.result import (
 )
 
 __all__ = [
+    "ConvexFit",
+    "HalfSpaces",
     "RegistrationResult",
     "RegistrationStatus",
     "RigidFit",
     "RobustLoss",
     "fit_rigid",
+    "fit_rigid_constrained",
+    "fit_rigid_convex",
     "fit_rotation",
     "fit_translation",
     "pose_uncertainty",
