@@ -1,9 +1,9 @@
-#include "prehensile/features.h"
-
 #include <algorithm>
+#include <cmath>
 
 #include "bindings.h"
 #include "numpy_arrays.h"
+#include "prehensile/features.h"
 
 namespace nb = nanobind;
 using nb::literals::operator""_a;
@@ -27,6 +27,43 @@ class OrientedPoints {
   ArrayArgument points_;
   ArrayArgument normals_;
 };
+
+nb::object ComputeFpfh(nb::handle points, nb::handle normals, double radius, int num_threads) {
+  const OrientedPoints cloud(points, normals);
+  std::vector<float> features(cloud.size() * kFpfhSize);
+  {
+    const nb::gil_scoped_release release;
+    Fpfh(cloud.points(), cloud.normals(), cloud.size(), radius, num_threads, features.data());
+  }
+  ArrayResult result({cloud.size(), std::size_t{kFpfhSize}});
+  std::copy(features.begin(), features.end(), result.data());
+  return result.Take();
+}
+
+std::vector<float> Features(nb::handle value, const char* name) {
+  const ArrayArgument features(value, name);
+  features.RequireShape({-1, kFpfhSize});
+  features.RequireFinite();
+  return {features.data(), features.end()};
+}
+
+nb::tuple FindNearestFeatures(nb::handle a, nb::handle b, int num_threads) {
+  const std::vector<float> from = Features(a, "a"), to = Features(b, "b");
+  const std::size_t n = from.size() / kFpfhSize;
+  ArrayResult<std::int32_t> nearest({n});
+  std::vector<float> first(n), second(n);
+  {
+    const nb::gil_scoped_release release;
+    NearestFeatures(from.data(), n, to.data(), to.size() / kFpfhSize, num_threads, nearest.data(),
+                    first.data(), second.data());
+  }
+  ArrayResult distances({n}), second_distances({n});
+  for (std::size_t i = 0; i < n; ++i) {
+    distances.data()[i] = std::sqrt(first[i]);
+    second_distances.data()[i] = std::sqrt(second[i]);
+  }
+  return nb::make_tuple(nearest.Take(), distances.Take(), second_distances.Take());
+}
 
 void BuildTable(PointPairTable* self, nb::handle points, nb::handle normals, double distance_step) {
   const OrientedPoints model(points, normals);
@@ -54,6 +91,8 @@ nb::tuple Vote(const PointPairTable& self, nb::handle points, nb::handle normals
 }  // namespace
 
 void BindFeatures(nb::module_& m) {
+  m.def("fpfh", &ComputeFpfh, "points"_a, "normals"_a, "radius"_a, "num_threads"_a = 1);
+  m.def("nearest_features", &FindNearestFeatures, "a"_a, "b"_a, "num_threads"_a = 1);
   nb::class_<PointPairTable>(m, "PointPairTable")
       .def("__init__", &BuildTable, "points"_a, "normals"_a, "distance_step"_a)
       .def_prop_ro("num_points", &PointPairTable::num_points)

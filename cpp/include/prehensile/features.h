@@ -6,6 +6,36 @@
 
 namespace prehensile {
 
+/// Numbers in a fast point feature histogram: eleven bins for each of three angles.
+inline constexpr int kFpfhSize = 33;
+
+/// Fast point feature histograms (Rusu, Blodow, Beetz, "Fast point feature histograms (FPFH) for
+/// 3D registration", ICRA 2009).
+///
+/// Two points with normals span a Darboux frame at the one whose normal makes the smaller angle
+/// with the line between them; the other's normal in that frame gives three angles. Each point
+/// counts those of the pairs with all its neighbours in three histograms, that sum to 100 each. Its
+/// feature is that plus the mean of its neighbours' histograms, weighed by 1 / squared distance and
+/// scaled to the sum 100 again (with the squared distance, as implementations in use do).
+///
+/// @param points n rows of x, y, z, finite, n < 2³¹.
+/// @param normals n unit vectors. A zero normal leaves its point out.
+/// @param radius of the neighbourhoods [m], > 0.
+/// @param features room for n rows of kFpfhSize. Zero for a point without normal or neighbour.
+/// @throws std::invalid_argument naming the argument.
+void Fpfh(const double* points, const double* normals, std::size_t n, double radius,
+          int num_threads, float* features);
+
+/// For each of n features, which of m others is nearest by Euclidean distance.
+///
+/// @param a, b n and m rows of kFpfhSize, finite; n, m < 2³¹.
+/// @param nearest room for n: the row of b, the smaller of equals; -1 if b has none.
+/// @param squared_distances room for n; infinity where there is none.
+/// @param second_squared_distances room for n: of the second nearest.
+void NearestFeatures(const float* a, std::size_t n, const float* b, std::size_t m, int num_threads,
+                     std::int32_t* nearest, float* squared_distances,
+                     float* second_squared_distances);
+
 /// A pose of a model in a scene, and how many pairs of points spoke for it.
 struct PoseVote {
   /// X_WO, row-major (4, 4).

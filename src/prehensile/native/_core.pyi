@@ -360,3 +360,74 @@ class KdTree:
         self, queries: ArrayLike, radius: float, num_threads: int
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
         """Number for each query; indices and distances of all."""
+
+def fpfh(
+    points: ArrayLike, normals: ArrayLike, radius: float, num_threads: int = 1
+) -> NDArray[np.float64]: ...
+def nearest_features(
+    a: ArrayLike, b: ArrayLike, num_threads: int = 1
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """The row of b nearest to each of a, its distance and that of the second nearest."""
+
+class PointPairTable:
+    def __init__(self, points: ArrayLike, normals: ArrayLike, distance_step: float) -> None: ...
+    @property
+    def num_points(self) -> int: ...
+    @property
+    def num_pairs(self) -> int: ...
+    @property
+    def diameter(self) -> float: ...
+    def vote(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike,
+        num_references: int,
+        peaks_per_reference: int,
+        max_poses: int,
+        num_threads: int = 1,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+class MeshSurface:
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None: ...
+    @property
+    def is_closed(self) -> bool: ...
+    @property
+    def num_pieces(self) -> int: ...
+    def nearest(
+        self, queries: ArrayLike, max_distance: float, num_threads: int
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int32],
+        NDArray[np.float64],
+        NDArray[np.float64],
+    ]: ...
+    def signed_distance(self, queries: ArrayLike, num_threads: int) -> NDArray[np.float64]: ...
+    def winding_number(self, queries: ArrayLike) -> NDArray[np.float64]: ...
+
+# Regions of a cloud (prehensile/regions.h); labels are (N,) int64, -1 for none.
+def ransac_plane(
+    points: ArrayLike, max_distance: float, confidence: float, max_iterations: int, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.uint8], int]: ...
+def euclidean_clusters(
+    points: ArrayLike, tolerance: float, min_points: int
+) -> NDArray[np.int64]: ...
+def grow_planes(
+    points: ArrayLike,
+    normals: ArrayLike,
+    radius: float,
+    max_angle: float,
+    max_distance: float,
+    min_points: int,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+def convex_segments(
+    points: ArrayLike,
+    normals: ArrayLike,
+    voxel_size: float,
+    max_concavity: float,
+    max_step: float,
+    min_points: int,
+) -> NDArray[np.int64]: ...
+def resting_pairs(
+    points: ArrayLike, normals: ArrayLike, labels: ArrayLike, voxel_size: float, num_labels: int
+) -> NDArray[np.int64]: ...
