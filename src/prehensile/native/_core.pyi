@@ -431,3 +431,36 @@ def convex_segments(
 def resting_pairs(
     points: ArrayLike, normals: ArrayLike, labels: ArrayLike, voxel_size: float, num_labels: int
 ) -> NDArray[np.int64]: ...
+
+# Registration by iterative closest points.
+
+class IcpCloud:
+    def __init__(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None,
+        intensities: ArrayLike | None,
+        tree: bool,
+        estimate_normals: bool,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+
+def icp(
+    scene: IcpCloud,
+    model: IcpCloud,
+    guesses: ArrayLike,
+    *,
+    kind: str,
+    direction: str,
+    max_distance: float,
+    min_normal_cosine: float,
+    kept_fraction: float,
+    loss: str,
+    loss_scale: float,
+    graduated: bool,
+    color_weight: float,
+    max_iterations: int,
+    tolerance: float,
+    keep_history: bool,
+    num_threads: int,
+) -> list[dict[str, Any]]: ...
