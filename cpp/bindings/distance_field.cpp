@@ -1,9 +1,173 @@
+#include "prehensile/distance_field.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+
 #include "bindings.h"
+#include "numpy_arrays.h"
+#include "prehensile/refine.h"
 
 namespace nb = nanobind;
+using nb::literals::operator""_a;
 
 namespace prehensile {
+namespace {
 
-void BindDistanceField(nb::module_& /*m*/) {}
+using Array3 = std::array<double, 3>;
+using Sizes = std::array<std::int32_t, 3>;
+using NodeArray = nb::ndarray<const float, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
+using TriangleArray =
+    nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+/// Rows of x, y, z.
+class PointsArgument : public ArrayArgument {
+ public:
+  PointsArgument(nb::handle value, const char* name, std::ptrdiff_t n = -1)
+      : ArrayArgument(value, name) {
+    RequireShape({n, 3});
+    RequireFinite();
+  }
+};
+
+void FromNodes(DistanceField* field, const Array3& origin, double spacing, const Sizes& sizes,
+               const NodeArray& nodes, bool is_signed) {
+  std::vector<FieldNode> copy(nodes.shape(0));
+  if (!copy.empty())
+    std::memcpy(static_cast<void*>(copy.data()), nodes.data(), copy.size() * sizeof(FieldNode));
+  new (field) DistanceField({origin, spacing, sizes}, std::move(copy), is_signed);
+}
+
+DistanceField FromMesh(nb::handle vertices, const TriangleArray& triangles, const Array3& origin,
+                       double spacing, const Sizes& sizes, bool is_signed, int num_threads) {
+  const PointsArgument v(vertices, "vertices");
+  const nb::gil_scoped_release release;
+  return MeshDistanceField(v.data(), v.shape(0), triangles.data(), triangles.shape(0),
+                           {origin, spacing, sizes}, is_signed, num_threads);
+}
+
+DistanceField FromCloud(nb::handle points, nb::handle normals, double radius, const Array3& origin,
+                        double spacing, const Sizes& sizes, int num_threads) {
+  const PointsArgument p(points, "points");
+  const PointsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
+  const nb::gil_scoped_release release;
+  return CloudDistanceField(p.data(), n.data(), p.shape(0), radius, {origin, spacing, sizes},
+                            num_threads);
+}
+
+nb::tuple At(const DistanceField& field, nb::handle points, int num_threads) {
+  const PointsArgument p(points, "points");
+  const std::size_t n = p.shape(0);
+  ArrayResult<> distances{n}, gradients{n, 3};
+  double *const d = distances.data(), *const g = gradients.data();
+  {
+    const nb::gil_scoped_release release;
+    field.AtRows(p.data(), n, num_threads, d, g);
+  }
+  return nb::make_tuple(distances.Take(), gradients.Take());
+}
+
+nb::tuple Closest(const DistanceField& field, nb::handle points) {
+  const PointsArgument p(points, "points");
+  const std::size_t n = p.shape(0);
+  ArrayResult<> at{n, 3}, normals{n, 3};
+  double *const to_point = at.data(), *const to_normal = normals.data();
+  {
+    const nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto found = field.Closest(Eigen::Map<const Eigen::Vector3d>(p.data() + 3 * i));
+      for (int k = 0; k < 3; ++k) {
+        to_point[3 * i + k] = found.point[k];
+        to_normal[3 * i + k] = found.normal[k];
+      }
+    }
+  }
+  return nb::make_tuple(at.Take(), normals.Take());
+}
+
+nb::object Nodes(const DistanceField& field) {
+  const std::vector<FieldNode>& nodes = field.nodes();
+  nb::object owner = nb::find(field);
+  return nb::cast(
+      nb::ndarray<nb::numpy, const float>(&nodes.data()->distance, {nodes.size(), 4}, owner));
+}
+
+/// What came of one start, as (pose, cost, iterations on few points, on all, converged, finalist,
+/// information, sum of squares, sum of weights).
+nb::tuple Answer(const RefinedPose& pose) {
+  ArrayResult<> X{4, 4}, information{6, 6};
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data()) = pose.X_WO.matrix();
+  Eigen::Map<Eigen::Matrix<double, 6, 6>>(information.data()) = pose.information;
+  return nb::make_tuple(X.Take(), pose.cost, pose.coarse_iterations, pose.iterations,
+                        pose.converged, pose.is_finalist, information.Take(), pose.sum_squares,
+                        pose.sum_weights);
+}
+
+nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normals, nb::handle X_WO,
+                const std::string& loss, double scale, double initial_scale, double cooling,
+                double max_distance, double kept_fraction, double min_normal_cosine,
+                std::size_t num_coarse_points, int num_finalists, int max_coarse_iterations,
+                int max_iterations, double tolerance, int num_threads) {
+  const PointsArgument p(points, "points");
+  std::optional<PointsArgument> n;
+  if (!normals.is_none()) n.emplace(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
+  const ArrayArgument X(X_WO, "X_WO");
+  X.RequireShape({-1, 4, 4});
+  X.RequireFinite();
+  std::vector<Eigen::Isometry3d> starts(X.shape(0));
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    starts[i].matrix() =
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data() + 16 * i);
+  }
+  const RefineOptions options{.loss = ParseRobustLoss(loss),
+                              .scale = scale,
+                              .initial_scale = initial_scale,
+                              .cooling = cooling,
+                              .max_distance = max_distance,
+                              .kept_fraction = kept_fraction,
+                              .min_normal_cosine = min_normal_cosine,
+                              .num_coarse_points = num_coarse_points,
+                              .num_finalists = num_finalists,
+                              .max_coarse_iterations = max_coarse_iterations,
+                              .max_iterations = max_iterations,
+                              .tolerance = tolerance};
+  std::vector<RefinedPose> poses;
+  {
+    const nb::gil_scoped_release release;
+    poses = RefinePoses(p.data(), n ? n->data() : nullptr, p.shape(0), field, starts, options,
+                        num_threads);
+  }
+  nb::list answers;
+  for (const RefinedPose& pose : poses) answers.append(Answer(pose));
+  return answers;
+}
+
+}  // namespace
+
+void BindDistanceField(nb::module_& m) {
+  nb::class_<DistanceField>(m, "DistanceField")
+      .def("__init__", &FromNodes, "origin"_a, "spacing"_a, "sizes"_a, "nodes"_a, "is_signed"_a)
+      .def_static("from_mesh", &FromMesh, "vertices"_a, "triangles"_a, "origin"_a, "spacing"_a,
+                  "sizes"_a, "is_signed"_a, "num_threads"_a)
+      .def_static("from_cloud", &FromCloud, "points"_a, "normals"_a, "radius"_a, "origin"_a,
+                  "spacing"_a, "sizes"_a, "num_threads"_a)
+      .def_prop_ro("origin", [](const DistanceField& field) { return field.grid().origin; })
+      .def_prop_ro("spacing", [](const DistanceField& field) { return field.grid().spacing; })
+      .def_prop_ro("sizes", [](const DistanceField& field) { return field.grid().sizes; })
+      .def_prop_ro("is_signed", &DistanceField::is_signed)
+      .def_prop_ro("nodes", &Nodes)
+      .def("at", &At, "points"_a, "num_threads"_a)
+      .def("closest", &Closest, "points"_a);
+  m.def("refine_poses", &Refine, "field"_a, "points"_a, "normals"_a.none(), "X_WO"_a, "loss"_a,
+        "scale"_a, "initial_scale"_a, "cooling"_a, "max_distance"_a, "kept_fraction"_a,
+        "min_normal_cosine"_a, "num_coarse_points"_a, "num_finalists"_a, "max_coarse_iterations"_a,
+        "max_iterations"_a, "tolerance"_a, "num_threads"_a);
+}
 
 }  // namespace prehensile

@@ -19,11 +19,16 @@ struct FieldGrid {
   std::array<std::int32_t, 3> sizes{};
 
   std::size_t num_nodes() const {
-    return static_cast<std::size_t>(sizes[0]) *
-           static_cast<std::size_t>(sizes[1]) *
+    return static_cast<std::size_t>(sizes[0]) * static_cast<std::size_t>(sizes[1]) *
            static_cast<std::size_t>(sizes[2]);
   }
 };
+
+/// Most nodes of a grid: 4 GiB.
+inline constexpr double kMostFieldNodes = 1 << 28;
+
+/// @throws std::invalid_argument naming origin, spacing or sizes if the grid is none, or too large.
+void Validate(const FieldGrid& grid);
 
 /// What a field knows at a node. 16 bytes, aligned so that one load takes them.
 struct alignas(16) FieldNode {
@@ -54,7 +59,7 @@ struct alignas(16) FieldNode {
 ///
 /// Constant; may be asked on several threads at once.
 class DistanceField {
-public:
+ public:
   struct Value {
     /// f [m].
     double distance;
@@ -78,32 +83,31 @@ public:
   /// @throws std::invalid_argument naming the argument if a number is not
   /// finite, a size below 2,
   ///   or the number of nodes is not that of the grid, or 2³¹ or more.
-  DistanceField(const FieldGrid &grid, std::vector<FieldNode> nodes,
-                bool is_signed);
+  DistanceField(const FieldGrid& grid, std::vector<FieldNode> nodes, bool is_signed);
 
-  const FieldGrid &grid() const { return grid_; }
-  const std::vector<FieldNode> &nodes() const { return nodes_; }
+  const FieldGrid& grid() const { return grid_; }
+  const std::vector<FieldNode>& nodes() const { return nodes_; }
   /// Whether the sign of the distance tells inside from outside.
   bool is_signed() const { return is_signed_; }
 
   /// @param p_O finite point in the object's frame.
-  Value At(const Eigen::Vector3d &p_O) const;
+  Value At(const Eigen::Vector3d& p_O) const;
 
   /// As At(), but with sides near the surface also where the field is not
   /// signed: what least squares and interpolation want.
-  Value OrientedAt(const Eigen::Vector3d &p_O) const;
+  Value OrientedAt(const Eigen::Vector3d& p_O) const;
 
   /// @param p_O finite point in the object's frame.
-  SurfacePoint Closest(const Eigen::Vector3d &p_O) const;
+  SurfacePoint Closest(const Eigen::Vector3d& p_O) const;
 
   /// At() for n rows of x, y, z.
   ///
   /// @param distances room for n.
   /// @param gradients room for n rows; nullptr for none.
-  void AtRows(const double *p_O, std::size_t n, int num_threads,
-              double *distances, double *gradients) const;
+  void AtRows(const double* p_O, std::size_t n, int num_threads, double* distances,
+              double* gradients) const;
 
-private:
+ private:
   FieldGrid grid_;
   std::vector<FieldNode> nodes_;
   bool is_signed_;
@@ -118,24 +122,22 @@ private:
 ///
 /// @param vertices num_vertices rows of x, y, z, in O.
 /// @param triangles num_triangles rows of indices, counter-clockwise seen from
-/// outside. Vertices at
-///   the same place count as one.
+/// outside. Vertices at the
+///   same place count as one.
 /// @param is_signed whether the mesh must tell inside from outside.
 /// @throws std::invalid_argument naming the argument: values out of range, or
 /// triangles that should
-///   be signed but are not closed, overlap, or are turned inside out.
-DistanceField
-MeshDistanceField(const double *vertices, std::size_t num_vertices,
-                  const std::int32_t *triangles, std::size_t num_triangles,
-                  const FieldGrid &grid, bool is_signed, int num_threads);
+///   be signed but are not closed, or are turned inside out.
+DistanceField MeshDistanceField(const double* vertices, std::size_t num_vertices,
+                                const std::int32_t* triangles, std::size_t num_triangles,
+                                const FieldGrid& grid, bool is_signed, int num_threads);
 
 /// The field, not signed, of points with normals: each stands for a disc.
 ///
 /// @param points, normals n rows of x, y, z each; the normals of unit length.
 /// @param radius of the discs [m]: about the distance of neighbouring points.
 /// @throws std::invalid_argument naming the argument.
-DistanceField CloudDistanceField(const double *points, const double *normals,
-                                 std::size_t n, double radius,
-                                 const FieldGrid &grid, int num_threads);
+DistanceField CloudDistanceField(const double* points, const double* normals, std::size_t n,
+                                 double radius, const FieldGrid& grid, int num_threads);
 
-} // namespace prehensile
+}  // namespace prehensile

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// Looking a distance up in the nodes of a field. `static`, so that kernels that are compiled once
+// per SIMD level have their own; those know no Eigen, hence nodes of four plain numbers.
+
+namespace prehensile::internal {
+
+/// A field without its memory. Scalar is that of the points asked for.
+template <typename Scalar>
+struct FieldView {
+  /// Distance and gradient of each; see FieldNode.
+  const float* nodes;
+  Scalar origin[3];
+  Scalar spacing, inverse_spacing;
+  std::int32_t sizes[3];
+  bool is_signed;
+};
+
+template <typename Scalar>
+struct FieldValue {
+  Scalar distance;
+  Scalar gradient[3];
+};
+
+template <typename Scalar>
+struct FieldLanes;
+template <>
+struct FieldLanes<float> {
+  using Type = float __attribute__((vector_size(16)));
+};
+template <>
+struct FieldLanes<double> {
+  using Type = double __attribute__((vector_size(32)));
+};
+
+/// See DistanceField::OrientedAt.
+template <typename Scalar>
+[[gnu::always_inline]] static inline FieldValue<Scalar> LookUp(const FieldView<Scalar>& field,
+                                                               const Scalar* p) {
+  using Node = typename FieldLanes<float>::Type;
+  using Lanes = typename FieldLanes<Scalar>::Type;
+  std::int32_t index[3];
+  Scalar t[3];       // Where in the cell, 0 to 1.
+  Scalar beyond[3];  // How far outside the grid, in cells.
+  for (int k = 0; k < 3; ++k) {
+    const Scalar u = (p[k] - field.origin[k]) * field.inverse_spacing;
+    const auto last = static_cast<Scalar>(field.sizes[k] - 1);
+    const Scalar inside = u > 0 ? (u < last ? u : last) : Scalar{0};
+    beyond[k] = u - inside;
+    const auto cell = static_cast<std::int32_t>(inside);
+    index[k] = cell < field.sizes[k] - 1 ? cell : field.sizes[k] - 2;
+    t[k] = inside - static_cast<Scalar>(index[k]);
+  }
+  const std::ptrdiff_t step_y = field.sizes[2];
+  const std::ptrdiff_t step_x = step_y * field.sizes[1];
+  const float* const first = field.nodes + 4 * (index[0] * step_x + index[1] * step_y + index[2]);
+
+  Node corners[8];
+  for (int c = 0; c < 8; ++c) {
+    __builtin_memcpy(&corners[c], first + 4 * ((c >> 2) * step_x + (c >> 1 & 1) * step_y + (c & 1)),
+                     sizeof(Node));
+  }
+  if (!field.is_signed) {
+    // Away from the surface, sides end somewhere. Neighbours whose distances differ by more than
+    // their distance are not of one side: they take that of the corner nearest to p.
+    const int near = (t[0] > Scalar{0.5}) * 4 + (t[1] > Scalar{0.5}) * 2 + (t[2] > Scalar{0.5});
+    const float side = corners[near][0];
+    const float most = 1.8F * static_cast<float>(field.spacing);
+    for (Node& corner : corners) {
+      const float difference = corner[0] - side;
+      if (corner[0] * side < 0 && difference * difference > most * most) corner = -corner;
+    }
+  }
+
+  Lanes blend{}, tangent{};  // Σ w (d, g), and Σ w (d, ½ (p - x) g).
+  for (int c = 0; c < 8; ++c) {
+    const bool x = c >> 2, y = c >> 1 & 1, z = c & 1;
+    const Scalar w = (x ? t[0] : 1 - t[0]) * (y ? t[1] : 1 - t[1]) * (z ? t[2] : 1 - t[2]);
+    const Lanes half{1, x ? t[0] - 1 : t[0], y ? t[1] - 1 : t[1], z ? t[2] - 1 : t[2]};
+    const Lanes node = __builtin_convertvector(corners[c], Lanes) * w;
+    blend += node;
+    tangent += node * half;
+  }
+  const Scalar slope = tangent[1] + tangent[2] + tangent[3];
+  FieldValue<Scalar> value{tangent[0] + Scalar{0.5} * field.spacing * slope,
+                           {blend[1], blend[2], blend[3]}};
+  if (beyond[0] != 0 || beyond[1] != 0 || beyond[2] != 0) {
+    // From the surface point of the nearest point q of the grid, q - d g, to p.
+    Scalar* const g = value.gradient;
+    const Scalar norm2 = g[0] * g[0] + g[1] * g[1] + g[2] * g[2];
+    const Scalar step = norm2 > 0 ? value.distance / __builtin_sqrt(norm2) : Scalar{0};
+    const Scalar side = value.distance < 0 ? -1 : 1;
+    Scalar o[3], length2 = 0;
+    for (int k = 0; k < 3; ++k) {
+      o[k] = beyond[k] * field.spacing + step * g[k];
+      length2 += o[k] * o[k];
+    }
+    if (length2 > 0) {
+      const Scalar length = __builtin_sqrt(length2);
+      value.distance = side * length;
+      for (int k = 0; k < 3; ++k) g[k] = side * o[k] / length;
+    }
+  }
+  return value;
+}
+
+}  // namespace prehensile::internal
