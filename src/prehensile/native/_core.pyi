@@ -1,7 +1,7 @@
 """Signatures of the compiled module (cpp/bindings/module.cpp)."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

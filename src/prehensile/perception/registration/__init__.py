@@ -2,6 +2,14 @@
 
 from prehensile.perception.registration.constraints import HalfSpaces, fit_rigid_constrained
 from prehensile.perception.registration.convex_constraints import ConvexFit, fit_rigid_convex
+from prehensile.perception.registration.icp import (
+    IcpConfig,
+    IcpDirection,
+    IcpKind,
+    IcpModel,
+    icp,
+    icp_many_starts,
+)
 from prehensile.perception.registration.known import (
     RigidFit,
     fit_rigid,
@@ -18,6 +26,10 @@ from prehensile.perception.registration.result import (
 __all__ = [
     "ConvexFit",
     "HalfSpaces",
+    "IcpConfig",
+    "IcpDirection",
+    "IcpKind",
+    "IcpModel",
     "RegistrationResult",
     "RegistrationStatus",
     "RigidFit",
@@ -27,5 +39,7 @@ __all__ = [
     "fit_rigid_convex",
     "fit_rotation",
     "fit_translation",
+    "icp",
+    "icp_many_starts",
     "pose_uncertainty",
 ]
