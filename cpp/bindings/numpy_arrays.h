@@ -23,7 +23,7 @@ namespace prehensile {
 /// ndarraytypes.h.
 struct NumpyApi {
   using Type = PyTypeObject;
-  enum Dtype { kUint8 = 2, kInt32 = 5, kFloat64 = 12 };
+  enum Dtype { kUint8 = 2, kInt32 = 5, kInt64 = 7, kFloat32 = 11, kFloat64 = 12 };
   enum Flags { kCContiguous = 0x1, kEnsureArray = 0x40, kAligned = 0x100, kNotSwapped = 0x200 };
   /// The head of every array object.
   struct Array {
@@ -192,6 +192,8 @@ class ArrayResult {
  public:
   ArrayResult(std::initializer_list<std::size_t> shape) {
     constexpr int kDtype = std::is_same_v<T, double>         ? NumpyApi::kFloat64
+                           : std::is_same_v<T, float>        ? NumpyApi::kFloat32
+                           : std::is_same_v<T, std::int64_t> ? NumpyApi::kInt64
                            : std::is_same_v<T, std::int32_t> ? NumpyApi::kInt32
                                                              : NumpyApi::kUint8;
     static_assert(kDtype != NumpyApi::kUint8 || std::is_same_v<T, std::uint8_t>);

@@ -464,3 +464,42 @@ def icp(
     keep_history: bool,
     num_threads: int,
 ) -> list[dict[str, Any]]: ...
+
+# Tracking: a view is (depth (H, W) float32, K (3, 3), X_WC (4, 4), ignored (H, W) uint8 or None);
+# X_WB (L, 4, 4) are the poses of the bodies whose fields are given.
+
+def points_near_bodies(
+    views: list[tuple[NDArray[np.float32], ArrayLike, ArrayLike, NDArray[np.uint8] | None]],
+    fields: list[DistanceField],
+    X_WB: ArrayLike,
+    other_fields: list[DistanceField],
+    X_WK: ArrayLike,
+    max_distance: float,
+    other_margin: float,
+    max_pixels: int,
+) -> NDArray[np.float64]:
+    """(M, 3) measured points near the bodies' surfaces and not nearer to the others."""
+
+def body_terms(
+    points: ArrayLike,
+    fields: list[DistanceField],
+    X_WB: ArrayLike,
+    loss: str,
+    loss_scale: float,
+    views: list[tuple[NDArray[np.float32], ArrayLike, ArrayLike, NDArray[np.uint8] | None]],
+    samples: list[tuple[ArrayLike, ArrayLike]],
+    margin: float,
+    max_violation: float,
+    search_radius: int,
+    free_space_weight: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Gauss-Newton terms of each body: information (L, 6, 6), gradient (L, 6), then the cost, the
+    sum of weights and of weighted squares (L, 3), then how many samples (L, 5) face a camera, are
+    seen, lie in free space, are occluded, unknown."""
+
+def free_space_violation(
+    points_W: ArrayLike,
+    view: list[tuple[NDArray[np.float32], ArrayLike, ArrayLike, NDArray[np.uint8] | None]],
+    margin: float,
+) -> NDArray[np.float64]:
+    """(N,) how far points lie in space that the camera saw through [m]."""

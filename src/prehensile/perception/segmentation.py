@@ -1,9 +1,12 @@
-"""Splitting a cloud into objects without knowing them."""
+"""Splitting a cloud into objects, by what is known of the scene and by shape alone."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from prehensile.perception.cloud import PointCloud
+from prehensile.native import _core
+from prehensile.perception.cloud import Box, PointCloud, inside_box
 
 
 def convex_segments(
@@ -35,39 +38,9 @@ def convex_segments(
     Returns:
         (N,) labels 0, 1, ... by decreasing number of points; -1 for points of no piece.
     """
-    n = len(cloud)
-    if n == 0:
-        return np.zeros(0, dtype=np.int64)
-    i, j = _adjacent_pairs(cloud.points, voxel_size)
-    d = cloud.points[j] - cloud.points[i]
-    n_i, n_j = cloud.require_normals()[i], cloud.require_normals()[j]
-    turn = n_j - n_i
-    angle = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(turn, axis=1), 1.0))
-    # Convex: going from i to j the normal leans forward, so turn . d >= 0. Points of adjacent
-    # voxels can be very near each other; then direction means little.
-    length = np.maximum(np.linalg.norm(d, axis=1), 0.5 * voxel_size)
-    concave = np.sum(turn * d, axis=1) < -2 * np.sin(0.5 * max_concavity) * length
-    height = np.abs(np.sum((n_i + n_j) * d, axis=1)) / 2
-    step = (height > max_step * voxel_size) & (angle < np.deg2rad(70))
-    opposite = angle > np.deg2rad(145)  # the two faces of a sheet
-
-    edge = np.zeros(n, dtype=bool)
-    edge[i[concave | step]] = True
-    edge[j[concave | step]] = True
-    joined = ~(concave | step | opposite)
-    smooth = joined & ~edge[i] & ~edge[j]
-    root = _components(n, i[smooth], j[smooth])
-    _, inverse, count = np.unique(root, return_inverse=True, return_counts=True)
-    order = np.argsort(-count, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    rank[count < min_points] = -1
-    labels = rank[inverse]
-    i, j = np.concatenate([i[joined], j[joined]]), np.concatenate([j[joined], i[joined]])
-    for _ in range(2):  # an edge is two voxels wide
-        take = (labels[i] < 0) & (labels[j] >= 0)
-        labels[i[take]] = labels[j[take]]
-    return labels
+    return _core.convex_segments(
+        cloud.points, cloud.require_normals(), voxel_size, max_concavity, max_step, min_points
+    )
 
 
 def resting_pairs(
@@ -86,65 +59,63 @@ def resting_pairs(
     Returns:
         (L, L) matrix; entry [a, b] counts the adjacent points that show b resting on a.
     """
-    count = labels.max(initial=-1) + 1
-    result = np.zeros((count, count), dtype=np.int64)
-    if count == 0:
-        return result
-    i, j = _adjacent_pairs(cloud.points, voxel_size)
-    i, j = np.concatenate([i, j]), np.concatenate([j, i])
-    up = cloud.require_normals()[:, 2]
-    on = (
-        (labels[i] != labels[j])
-        & (labels[i] >= 0)
-        & (labels[j] >= 0)
-        & (up[i] > 0.5)
-        & (up[j] < 0.5)
-        & (cloud.points[j, 2] >= cloud.points[i, 2])
-    )
-    np.add.at(result, (labels[i[on]], labels[j[on]]), 1)
-    return result
+    count = int(labels.max(initial=-1)) + 1
+    return _core.resting_pairs(cloud.points, cloud.require_normals(), labels, voxel_size, count)
 
 
-def _adjacent_pairs(
-    points: NDArray[np.float64], voxel_size: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of points in voxels that share a face, an edge or a corner, each pair once."""
-    cell = np.floor(points / voxel_size).astype(np.int64)
-    cell -= cell.min(axis=0) - 1
-    extent = cell.max(axis=0) + 2
-    key = (cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]
-    order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
-    first, second = [], []
-    for dx, dy, dz in np.ndindex(3, 3, 3):
-        shift = ((dx - 1) * extent[1] + (dy - 1)) * extent[2] + (dz - 1)
-        if shift <= 0:
-            continue
-        at = np.minimum(np.searchsorted(sorted_key, key + shift), len(points) - 1)
-        hit = np.nonzero(sorted_key[at] == key + shift)[0]
-        first.append(hit)
-        second.append(order[at[hit]])
-    return np.concatenate(first), np.concatenate(second)
+def euclidean_clusters(
+    points: NDArray[np.float64], tolerance: float, *, min_points: int = 1
+) -> NDArray[np.int64]:
+    """Labels the pieces of a cloud that lie apart from each other.
 
+    Two points belong together if a chain of points leads from one to the other in steps no longer
+    than the tolerance (Rusu, "Semantic 3D Object Maps", 2009, section 6.2). Exact; a grid finds
+    the neighbours.
 
-def _components(n: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Connected components of the graph of n nodes with edges (i, j): the least node of each.
+    Args:
+        points: (N, 3) positions [m].
+        tolerance: longest step [m], > 0.
+        min_points: smaller pieces are labelled -1.
 
-    Every node hangs on a smaller one; each round hooks the roots of an edge's ends together and
-    then shortens all chains (Shiloach and Vishkin, 1982).
+    Returns:
+        (N,) labels 0, 1, ... by decreasing number of points; -1 for points of no piece.
+
+    Raises:
+        ValueError: naming the argument: points not finite, or more than a million tolerances from
+            the origin; tolerance not positive.
     """
-    parent = np.arange(n)
-    while True:
-        root_i, root_j = parent[i], parent[j]
-        differ = root_i != root_j
-        if not differ.any():
-            return parent
-        i, j = i[differ], j[differ]
-        low = np.minimum(root_i[differ], root_j[differ])
-        high = np.maximum(root_i[differ], root_j[differ])
-        np.minimum.at(parent, high, low)
-        while True:
-            grand = parent[parent]
-            if np.array_equal(grand, parent):
-                break
-            parent = grand
+    return _core.euclidean_clusters(points, tolerance, max(min_points, 0))
+
+
+def subtract(cloud: PointCloud, solids: Sequence[Box], *, margin: float) -> PointCloud:
+    """The points that known solids (a table, the walls of a bin) do not account for, in order.
+
+    Args:
+        cloud: the cloud.
+        solids: boxes, in the cloud's frame.
+        margin: points no further than this from a solid along its faces' normals are its own [m].
+
+    Raises:
+        ValueError: if margin is negative or not finite.
+    """
+    if not 0 <= margin < np.inf:
+        raise ValueError(f"margin: must be at least 0 and finite, not {margin}")
+    kept = np.ones(len(cloud), dtype=bool)
+    for solid in solids:
+        grown = Box(solid.X_WB, np.asarray(solid.size) + 2 * margin)
+        kept &= ~inside_box(cloud.points, grown)
+    return cloud.select(kept)
+
+
+def nearest_segment(
+    cloud: PointCloud, labels: NDArray[np.int64], p_W: NDArray[np.float64]
+) -> PointCloud:
+    """The object of interest: the segment with the point nearest to p_W (3,), as a cloud.
+
+    Points labelled -1 are passed over; without any segment the result is empty.
+    """
+    own = np.nonzero(labels >= 0)[0]
+    if not len(own):
+        return cloud.select(own)
+    distance = np.linalg.norm(cloud.points[own] - np.asarray(p_W, dtype=np.float64), axis=1)
+    return cloud.select(labels == labels[own[np.argmin(distance)]])
