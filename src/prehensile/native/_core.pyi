@@ -459,6 +459,7 @@ def icp(
     loss_scale: float,
     graduated: bool,
     color_weight: float,
+    coarse_points: int,
     max_iterations: int,
     tolerance: float,
     keep_history: bool,
