@@ -66,26 +66,34 @@ template <typename Scalar>
   if (!field.is_signed) {
     // Away from the surface, sides end somewhere. Neighbours whose distances differ by more than
     // their distance are not of one side: they take that of the corner nearest to p.
-    const int near = (t[0] > Scalar{0.5}) * 4 + (t[1] > Scalar{0.5}) * 2 + (t[2] > Scalar{0.5});
-    const float side = corners[near][0];
+    const float side = first[4 * ((t[0] > Scalar{0.5}) * step_x + (t[1] > Scalar{0.5}) * step_y +
+                                  (t[2] > Scalar{0.5}))];
     const float most = 1.8F * static_cast<float>(field.spacing);
-    for (Node& corner : corners) {
-      const float difference = corner[0] - side;
-      if (corner[0] * side < 0 && difference * difference > most * most) corner = -corner;
+    for (int c = 0; c < 8; ++c) {
+      const float difference = corners[c][0] - side;
+      const bool other = corners[c][0] * side < 0 && difference * difference > most * most;
+      corners[c] *= other ? -1.0F : 1.0F;
     }
   }
 
-  Lanes blend{}, tangent{};  // Σ w (d, g), and Σ w (d, ½ (p - x) g).
+  // Σ w (d, g), and Σ w g · (p - x), by way of the sums over the far half of the corners along each
+  // axis: a far corner's offset along it is one cell less than a near one's.
+  const Scalar one = 1;
+  const Scalar near_x = one - t[0], near_y = one - t[1], near_z = one - t[2];
+  const Scalar w_yz[4] = {near_y * near_z, near_y * t[2], t[1] * near_z, t[1] * t[2]};
+  Lanes sum[8];
   for (int c = 0; c < 8; ++c) {
-    const bool x = c >> 2, y = c >> 1 & 1, z = c & 1;
-    const Scalar w = (x ? t[0] : 1 - t[0]) * (y ? t[1] : 1 - t[1]) * (z ? t[2] : 1 - t[2]);
-    const Lanes half{1, x ? t[0] - 1 : t[0], y ? t[1] - 1 : t[1], z ? t[2] - 1 : t[2]};
-    const Lanes node = __builtin_convertvector(corners[c], Lanes) * w;
-    blend += node;
-    tangent += node * half;
+    const Scalar w = (c < 4 ? near_x : t[0]) * w_yz[c & 3];
+    sum[c] = __builtin_convertvector(corners[c], Lanes) * w;
   }
-  const Scalar slope = tangent[1] + tangent[2] + tangent[3];
-  FieldValue<Scalar> value{tangent[0] + Scalar{0.5} * field.spacing * slope,
+  const Lanes far_y0 = sum[2] + sum[3], far_y1 = sum[6] + sum[7];
+  const Lanes far_x = (sum[4] + sum[5]) + far_y1;
+  const Lanes far_y = far_y0 + far_y1;
+  const Lanes far_z = (sum[1] + sum[3]) + (sum[5] + sum[7]);
+  const Lanes blend = ((sum[0] + sum[1]) + far_y0) + far_x;
+  const Scalar slope =
+      (t[0] * blend[1] - far_x[1]) + (t[1] * blend[2] - far_y[2]) + (t[2] * blend[3] - far_z[3]);
+  FieldValue<Scalar> value{blend[0] + Scalar{0.5} * field.spacing * slope,
                            {blend[1], blend[2], blend[3]}};
   if (beyond[0] != 0 || beyond[1] != 0 || beyond[2] != 0) {
     // From the surface point of the nearest point q of the grid, q - d g, to p.
