@@ -99,14 +99,18 @@ nb::object Nodes(const DistanceField& field) {
 }
 
 /// What came of one start, as (pose, cost, iterations on few points, on all, converged, finalist,
-/// information, sum of squares, sum of weights).
-nb::tuple Answer(const RefinedPose& pose) {
+/// information, sum of squares, sum of weights, residuals).
+nb::tuple Answer(RefinedPose&& pose) {
   ArrayResult<> X{4, 4}, information{6, 6};
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data()) = pose.X_WO.matrix();
   Eigen::Map<Eigen::Matrix<double, 6, 6>>(information.data()) = pose.information;
-  return nb::make_tuple(X.Take(), pose.cost, pose.coarse_iterations, pose.iterations,
-                        pose.converged, pose.is_finalist, information.Take(), pose.sum_squares,
-                        pose.sum_weights);
+  auto* const residuals = new std::vector<float>(std::move(pose.residuals));
+  const nb::capsule owner(residuals,
+                          [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  return nb::make_tuple(
+      X.Take(), pose.cost, pose.coarse_iterations, pose.iterations, pose.converged,
+      pose.is_finalist, information.Take(), pose.sum_squares, pose.sum_weights,
+      nb::ndarray<nb::numpy, float>(residuals->data(), {residuals->size()}, owner));
 }
 
 nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normals, nb::handle X_WO,
@@ -144,7 +148,7 @@ nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normal
                         num_threads);
   }
   nb::list answers;
-  for (const RefinedPose& pose : poses) answers.append(Answer(pose));
+  for (RefinedPose& pose : poses) answers.append(Answer(std::move(pose)));
   return answers;
 }
 
@@ -164,6 +168,7 @@ void BindDistanceField(nb::module_& m) {
       .def_prop_ro("nodes", &Nodes)
       .def("at", &At, "points"_a, "num_threads"_a)
       .def("closest", &Closest, "points"_a);
+  m.attr("MOST_FIELD_NODES") = kMostFieldNodes;
   m.def("refine_poses", &Refine, "field"_a, "points"_a, "normals"_a.none(), "X_WO"_a, "loss"_a,
         "scale"_a, "initial_scale"_a, "cooling"_a, "max_distance"_a, "kept_fraction"_a,
         "min_normal_cosine"_a, "num_coarse_points"_a, "num_finalists"_a, "max_coarse_iterations"_a,

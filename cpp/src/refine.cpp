@@ -69,10 +69,12 @@ class Scene {
     auto step = static_cast<std::size_t>(0.6180339887498949 * static_cast<double>(n));
     step = std::max<std::size_t>(step, 1);
     while (std::gcd(step, n) != 1) ++step;
+    order_.reserve(n);
     double sum_squares = 0;
     for (std::size_t i = 0, from = 0; i < n; ++i, from = (from + step) % n) {
       const Vector3d p = Eigen::Map<const Vector3d>(points + 3 * from) - mean_;
       sum_squares += p.squaredNorm();
+      order_.push_back(static_cast<std::uint32_t>(from));
       for (std::size_t k = 0; k < 3; ++k) {
         data_[k * stride_ + i] = static_cast<float>(p[static_cast<Eigen::Index>(k)]);
         if (normals) data_[(4 + k) * stride_ + i] = static_cast<float>(normals[3 * from + k]);
@@ -83,6 +85,8 @@ class Scene {
   }
 
   std::size_t size() const { return n_; }
+  /// Row in the input of each point.
+  const std::vector<std::uint32_t>& order() const { return order_; }
   const Vector3d& mean() const { return mean_; }
   /// Root mean square distance from the mean.
   double radius() const { return radius_; }
@@ -96,6 +100,7 @@ class Scene {
  private:
   std::size_t n_, stride_;
   std::vector<float> data_;
+  std::vector<std::uint32_t> order_;
   bool has_normals_;
   Vector3d mean_;
   double radius_ = 0;
@@ -192,14 +197,14 @@ class Refiner {
     return Cost(rows_[0], options_.scale, MaxDistance(rows_[0], options_.scale));
   }
 
-  /// What the points know about the pose at which FinalCost() was asked for last.
+  /// What all points know about the pose, at which FinalCost() was asked for last.
   void Information(const Placement& at, RefinedPose* pose) {
     internal::RefineSums sums;
     kernel_.sum(rows_[0], weights_, padded_, &sums);
-    // From motions about the centre in O to motions about O's origin in W: J of rotation becomes
-    // (centre + q) × g, and both turn.
+    // From motions about the centre in O to motions about the scene's mean in W: J of rotation
+    // becomes (q - t) × g, and all turn.
     Matrix6d A = Matrix6d::Identity();
-    A.topRightCorner<3, 3>() = Skew(centre_);
+    A.topRightCorner<3, 3>() = -Skew(at.t);
     Matrix6d turn = Matrix6d::Zero();
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = at.R.transpose();
     const Matrix6d B = turn * A;
@@ -209,6 +214,11 @@ class Refiner {
       const double w = weights_[i], r = rows_[0].r[i];
       pose->sum_squares += w * r * r;
       pose->sum_weights += w;
+    }
+    pose->residuals.resize(scene_.size());
+    for (std::size_t i = 0; i < scene_.size(); ++i) {
+      pose->residuals[scene_.order()[i]] =
+          rows_[0].valid[i] > 0 ? rows_[0].r[i] : std::numeric_limits<float>::infinity();
     }
   }
 
@@ -314,6 +324,7 @@ std::vector<RefinedPose> RefinePoses(const double* points, const double* normals
                                      const RefineOptions& options, int num_threads) {
   Validate(options);
   Require(n >= 1, "points: none");
+  Require(n <= std::numeric_limits<std::int32_t>::max(), "points: more than 2^31 - 1");
   const Scene scene(points, normals, n);
   std::vector<RefinedPose> poses(X_WO.size());
   std::vector<Placement> places(X_WO.size());

@@ -46,10 +46,13 @@ struct RefinedPose {
   int coarse_iterations = 0, iterations = 0;
   bool converged = false;
   bool is_finalist = false;
-  /// Gauss-Newton matrix Σ w J Jᵀ by a motion of the object [rotation about O; translation] in W,
-  /// and Σ w r², Σ w, over the points that count.
+  /// Of a finalist: Gauss-Newton matrix Σ w J Jᵀ by a motion of the object [rotation; translation
+  /// at the mean of the scene's points], expressed in W, and Σ w r², Σ w.
   Eigen::Matrix<double, 6, 6> information;
   double sum_squares = 0, sum_weights = 0;
+  /// Of a finalist: distance of each point of the scene from the model, signed if the field is [m];
+  /// infinite where normals disagree.
+  std::vector<float> residuals;
 };
 
 /// Poses X_WO of a known object that lay the points of a scene onto its surface, from many starts.

@@ -504,3 +504,99 @@ def free_space_violation(
     margin: float,
 ) -> NDArray[np.float64]:
     """(N,) how far points lie in space that the camera saw through [m]."""
+
+# Volumes (prehensile/volumes.h): adds an image to distances and weights (nx, ny, nz) in place.
+def integrate_depth(
+    distances: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    voxel_size: float,
+    X_WB: ArrayLike,
+    depth: NDArray[np.float32],
+    intrinsics: ArrayLike,
+    X_WC: ArrayLike,
+    truncation: float,
+    min_depth: float,
+    max_depth: float,
+    num_threads: int,
+) -> None: ...
+
+MOST_FIELD_NODES: int
+
+class DistanceField:
+    def __init__(
+        self,
+        origin: tuple[float, float, float],
+        spacing: float,
+        sizes: tuple[int, ...],
+        nodes: NDArray[np.float32],
+        is_signed: bool,
+    ) -> None: ...
+    @staticmethod
+    def from_mesh(
+        vertices: ArrayLike,
+        triangles: NDArray[np.int32],
+        origin: tuple[float, float, float],
+        spacing: float,
+        sizes: tuple[int, int, int],
+        is_signed: bool,
+        num_threads: int,
+    ) -> DistanceField: ...
+    @staticmethod
+    def from_cloud(
+        points: ArrayLike,
+        normals: ArrayLike,
+        radius: float,
+        origin: tuple[float, float, float],
+        spacing: float,
+        sizes: tuple[int, int, int],
+        num_threads: int,
+    ) -> DistanceField: ...
+    @property
+    def origin(self) -> list[float]: ...
+    @property
+    def spacing(self) -> float: ...
+    @property
+    def sizes(self) -> list[int]: ...
+    @property
+    def is_signed(self) -> bool: ...
+    @property
+    def nodes(self) -> NDArray[np.float32]: ...
+    def at(
+        self, points: ArrayLike, num_threads: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def closest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+RefinedPose = tuple[
+    NDArray[np.float64],
+    float,
+    int,
+    int,
+    bool,
+    bool,
+    NDArray[np.float64],
+    float,
+    float,
+    NDArray[np.float32],
+]
+
+def refine_poses(
+    field: DistanceField,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    X_WO: ArrayLike,
+    loss: str,
+    scale: float,
+    initial_scale: float,
+    cooling: float,
+    max_distance: float,
+    kept_fraction: float,
+    min_normal_cosine: float,
+    num_coarse_points: int,
+    num_finalists: int,
+    max_coarse_iterations: int,
+    max_iterations: int,
+    tolerance: float,
+    num_threads: int,
+) -> list[RefinedPose]:
+    """One for each start: X_WO, cost, iterations on few points, on all, converged, finalist,
+    information, sum of squares, sum of weights, residuals."""
