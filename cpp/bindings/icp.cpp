@@ -73,8 +73,8 @@ nb::dict ToDict(const IcpResult& result) {
 nb::list IcpStarts(const IcpCloud& scene, const IcpCloud& model, nb::handle guesses,
                    const std::string& kind, const std::string& direction, double max_distance,
                    double min_normal_cosine, double kept_fraction, const std::string& loss,
-                   double loss_scale, bool graduated, double color_weight, int max_iterations,
-                   double tolerance, bool keep_history, int num_threads) {
+                   double loss_scale, bool graduated, double color_weight, int coarse_points,
+                   int max_iterations, double tolerance, bool keep_history, int num_threads) {
   const ArrayArgument poses(guesses, "guesses");
   poses.RequireShape({-1, 4, 4});
   std::vector<Eigen::Matrix4d> starts;
@@ -85,8 +85,9 @@ nb::list IcpStarts(const IcpCloud& scene, const IcpCloud& model, nb::handle gues
                            max_distance,    min_normal_cosine,
                            kept_fraction,   ParseRobustLoss(loss),
                            loss_scale,      graduated,
-                           color_weight,    max_iterations,
-                           tolerance,       keep_history};
+                           color_weight,    coarse_points,
+                           max_iterations,  tolerance,
+                           keep_history};
   std::vector<IcpResult> results;
   {
     const nb::gil_scoped_release release;
@@ -106,8 +107,8 @@ void BindIcp(nb::module_& m) {
       .def("__len__", &IcpCloud::size);
   m.def("icp", &IcpStarts, "scene"_a, "model"_a, "guesses"_a, nb::kw_only(), "kind"_a,
         "direction"_a, "max_distance"_a, "min_normal_cosine"_a, "kept_fraction"_a, "loss"_a,
-        "loss_scale"_a, "graduated"_a, "color_weight"_a, "max_iterations"_a, "tolerance"_a,
-        "keep_history"_a, "num_threads"_a);
+        "loss_scale"_a, "graduated"_a, "color_weight"_a, "coarse_points"_a, "max_iterations"_a,
+        "tolerance"_a, "keep_history"_a, "num_threads"_a);
 }
 
 }  // namespace prehensile

@@ -5,6 +5,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "losses.h"
 #include "parallel.h"
@@ -27,6 +28,8 @@ constexpr double kThickness = 1e-3;
 constexpr double kGncEnd = 100;
 /// Motions in which the sum curves less than by this part of the most are not made.
 constexpr double kFlat = 1e-9;
+/// All points take part once a step is below this part of the points' spread.
+constexpr double kFine = 0.01;
 
 /// A rotation and a translation, x_B = R x_A + p.
 struct Motion {
@@ -163,6 +166,7 @@ class Registration {
       : scene_(scene),
         model_(model),
         options_(options),
+        coarse_(options.coarse_points > 0),
         moved_(scene.size()),
         scene_search_(model, scene.size(), options.max_distance),
         model_search_(scene, model.size(), options.max_distance) {}
@@ -180,14 +184,17 @@ class Registration {
       if (static_cast<int>(pairs_.size()) < MinPairs()) break;
       Weigh();
       ++result.iterations;
-      const double way = Move();
-      if (way <= options_.tolerance && GraduationDone()) {
+      const auto [way, spread] = Move();
+      if (coarse_) {
+        coarse_ = way > kFine * spread || !GraduationDone();
+      } else if (way <= options_.tolerance && GraduationDone()) {
         result.outcome = IcpOutcome::kConverged;
         break;
       }
       if (options_.graduated) mu_ = internal::GncNext(options_.loss, mu_);
     }
     keep();
+    coarse_ = false;
     Judge(&result);
     return result;
   }
@@ -197,18 +204,27 @@ class Registration {
   int MinPairs() const { return Sliding() ? 6 : 3; }
   Vector3d SceneNormal(std::int32_t i) const { return X_OW_.R * scene_.normals()[i]; }
 
+  /// Every how many points one takes part.
+  std::size_t Stride(std::size_t size) const {
+    return coarse_ ? std::max<std::size_t>(size / options_.coarse_points, 1) : 1;
+  }
+
   void FindPairs() {
-    for (std::size_t i = 0; i < scene_.size(); ++i) moved_[i] = X_OW_ * scene_.points()[i];
+    const std::size_t scene_stride = Stride(scene_.size()), model_stride = Stride(model_.size());
+    const bool all = options_.direction != IcpDirection::kSceneToModel;
+    for (std::size_t i = 0; i < scene_.size(); i += all ? 1 : scene_stride) {
+      moved_[i] = X_OW_ * scene_.points()[i];
+    }
     pairs_.clear();
     double squared = 0;
     if (options_.direction != IcpDirection::kModelToScene) {
-      for (std::size_t i = 0; i < scene_.size(); ++i) {
+      for (std::size_t i = 0; i < scene_.size(); i += scene_stride) {
         AddPair(static_cast<std::int32_t>(i), scene_search_.Find(i, moved_[i], &squared), squared);
       }
     }
     if (options_.direction != IcpDirection::kSceneToModel) {
       const Motion X_WO = X_OW_.Inverse();
-      for (std::size_t j = 0; j < model_.size(); ++j) {
+      for (std::size_t j = 0; j < model_.size(); j += model_stride) {
         const std::int32_t i = model_search_.Find(j, X_WO * model_.points()[j], &squared);
         AddPair(i, static_cast<std::int32_t>(j), squared);
       }
@@ -286,8 +302,9 @@ class Registration {
 
   /// One step to the weighted pairs' minimum.
   ///
-  /// @return by how much the pairs' scene points moved, root mean square [m].
-  double Move() {
+  /// @return by how much the pairs' scene points moved, and how far they lie from their centroid,
+  ///     root mean squares [m].
+  std::pair<double, double> Move() {
     double total = 0;
     Vector3d center = Vector3d::Zero(), partner = Vector3d::Zero();
     for (std::size_t k = 0; k < pairs_.size(); ++k) {
@@ -295,7 +312,7 @@ class Registration {
       center += weights_[k] * moved_[pairs_[k].scene];
       partner += weights_[k] * model_.points()[pairs_[k].model];
     }
-    if (!(total > 0)) return 0;
+    if (!(total > 0)) return {0, 0};
     center /= total;
     partner /= total;
     double spread = 0;
@@ -324,8 +341,9 @@ class Registration {
     }
     X_OW_ = {Eigen::Quaterniond(step.R * X_OW_.R).normalized().toRotationMatrix(), step * X_OW_.p};
     const double turn = (step.R - Matrix3d::Identity()).norm();  // √2 the angle, if small.
-    return std::sqrt((step * center - center).squaredNorm() +
-                     0.5 * turn * turn * length_scale * length_scale);
+    const double way = std::sqrt((step * center - center).squaredNorm() +
+                                 0.5 * turn * turn * length_scale * length_scale);
+    return {way, length_scale};
   }
 
   NormalEquations Equations(const Vector3d& center) const {
@@ -418,6 +436,7 @@ class Registration {
   const IcpCloud& scene_;
   const IcpCloud& model_;
   const IcpOptions& options_;
+  bool coarse_;
   Motion X_OW_;
   std::vector<Vector3d> moved_;  // The scene in O.
   MovingSearch scene_search_, model_search_;
@@ -445,6 +464,7 @@ void Check(const IcpCloud& scene, const IcpCloud& model, const IcpOptions& optio
           "color_weight: must be at least 0 and below 1");
   Require(options.color_weight == 0 || (!scene.intensities().empty() && !model.gradients().empty()),
           "color_weight: both clouds must have colors");
+  Require(options.coarse_points >= 0, "coarse_points: must be at least 0");
   Require(options.max_iterations >= 1, "max_iterations: must be at least 1");
   Require(options.tolerance >= 0, "tolerance: must be at least 0");
 }

@@ -75,6 +75,8 @@ struct IcpOptions {
   bool graduated = false;
   /// The part of the colour in the sum (Park, Zhou and Koltun 2017); 0: colours do not matter.
   double color_weight = 0;
+  /// The first steps are made with about so many points, until they become small; 0: with all.
+  int coarse_points = 500;
   int max_iterations = 100;
   /// Done when a step moves the points by less than this, root mean square [m].
   double tolerance = 1e-5;

@@ -600,3 +600,32 @@ def refine_poses(
 ) -> list[RefinedPose]:
     """One for each start: X_WO, cost, iterations on few points, on all, converged, finalist,
     information, sum of squares, sum of weights, residuals."""
+
+# Depth images (prehensile/depth_fusion.h). A view is (depth (H, W) float32 or uint16, its unit [m],
+# (fx, fy, cx, cy), rays (2, H, W) float32 or None, X_WC, colors (H, W, 3) uint8 or None); limits are
+# those of prehensile.perception.depth.DepthConfig.limits().
+def fuse_depth(
+    views: list[tuple[NDArray, float, ArrayLike, NDArray | None, ArrayLike, NDArray | None]],
+    X_WB: ArrayLike,
+    size: ArrayLike,
+    voxel_size: float,
+    limits: tuple[float, float, int, float, float, float, float],
+    num_threads: int,
+    simd: str | None = None,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8] | None
+]:
+    """Points, normals, sensor origins (V, 3) in W, and colors or None."""
+
+def unproject_depth(
+    view: tuple[NDArray, float, ArrayLike, NDArray | None, ArrayLike, NDArray | None],
+    limits: tuple[float, float, int, float, float, float, float],
+    num_threads: int,
+    simd: str | None = None,
+) -> NDArray[np.float64]: ...
+def depth_normals(
+    view: tuple[NDArray, float, ArrayLike, NDArray | None, ArrayLike, NDArray | None],
+    limits: tuple[float, float, int, float, float, float, float],
+    num_threads: int,
+    simd: str | None = None,
+) -> NDArray[np.float64]: ...

@@ -61,6 +61,8 @@ class IcpConfig:
         color_weight: the part in [0, 1) of squared differences of grey values (0 to 1) in the sum
             (Park, Zhou and Koltun, "Colored point cloud registration revisited", ICCV 2017; theirs
             is 0.032). Both clouds must have colors.
+        coarse_points: the first steps are made with about so many points of the scene, evenly taken,
+            until they become small; 0: with all.
         max_iterations: at least 1.
         tolerance: done when a step moves the points by less, root mean square [m].
         min_overlap: fewer inliers than this part of the scene: ``LOW_OVERLAP``, 0 to 1.
@@ -76,6 +78,7 @@ class IcpConfig:
     loss_scale: float = 0.01
     graduated: bool = False
     color_weight: float = 0.0
+    coarse_points: int = 500
     max_iterations: int = 100
     tolerance: float = 1e-5
     min_overlap: float = 0.3
@@ -248,6 +251,7 @@ def _run(
         loss_scale=config.loss_scale,
         graduated=config.graduated,
         color_weight=config.color_weight,
+        coarse_points=config.coarse_points,
         max_iterations=config.max_iterations,
         tolerance=config.tolerance,
         keep_history=keep_history,
