@@ -488,7 +488,7 @@ def body_terms(
     loss: str,
     loss_scale: float,
     views: list[tuple[NDArray[np.float32], ArrayLike, ArrayLike, NDArray[np.uint8] | None]],
-    samples: list[tuple[ArrayLike, ArrayLike]],
+    samples: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
     margin: float,
     max_violation: float,
     search_radius: int,

@@ -1,0 +1,175 @@
+"""What depth images say about rigid bodies of known shape, in Gauss-Newton form.
+
+Two terms, as in dense articulated tracking (Schmidt, Newcombe and Fox, "DART", RSS 2014): the
+distance of each measured point to the nearest body's surface, robustly, and the depth by which
+the bodies' surfaces lie in space that the camera saw through. A free object is one body, an arm
+is one body per link.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from prehensile.native import _core
+from prehensile.perception.distance_field import DistanceField
+from prehensile.perception.free_space import DepthView
+from prehensile.perception.registration.losses import RobustLoss
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body B of known shape.
+
+    Attributes:
+        field: its distance field.
+        points: (K, 3) samples of its surface, expressed in B [m]; some hundreds.
+        normals: (K, 3) unit normals there, outward.
+    """
+
+    field: DistanceField
+    points: Array
+    normals: Array
+
+
+@dataclass(frozen=True)
+class EvidenceConfig:
+    """How images are read.
+
+    Attributes:
+        noise: standard deviation of a measured point across the surface [m], > 0.
+        correlation: how many points count as one, because neighbours err together, >= 1.
+        max_distance: points further from the predicted surface are not looked at [m], > 0.
+        loss_scale: scale of the Geman-McClure loss once the fit settles [m], > 0; it starts at
+            max_distance.
+        max_pixels: pixels looked at per image, >= 1.
+        margin: how far in front of the measured depth a surface may be [m], >= 0.
+        max_violation: deeper violations of the free space count as this deep [m], > 0.
+        search_radius: how far to look for the edge of the free space [pixels], 0 to 100.
+        free_space_weight: of a sample's violation against a point's distance, >= 0.
+        occluder_margin: points this near to a body in the way, and nearer to it than to those
+            looked for, are its own [m], >= 0.
+    """
+
+    noise: float = 0.002
+    correlation: float = 20.0
+    max_distance: float = 0.03
+    loss_scale: float = 0.005
+    max_pixels: int = 4000
+    margin: float = 0.01
+    max_violation: float = 0.03
+    search_radius: int = 12
+    free_space_weight: float = 2.0
+    occluder_margin: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Checks the ranges that the kernels do not check.
+
+        Raises:
+            ValueError: naming the field.
+        """
+        for name in ("noise", "max_distance", "loss_scale", "max_violation"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise ValueError(f"{name}: must be positive, not {getattr(self, name)}")
+        if not 1 <= self.correlation < np.inf:
+            raise ValueError(f"correlation: must be at least 1, not {self.correlation}")
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What images say near given poses, weighed by the noise.
+
+    Attributes:
+        information: (L, 6, 6) of a motion [w; v] of each body about its own origin, in W.
+        gradient: (L, 6) of half the weighed cost by that motion.
+        residual: root mean square distance of the points that count [m]; NaN without any.
+        num_points: effective number of points that count (the sum of their weights).
+        seen: part of the samples facing a camera that were measured where they should be.
+        in_free: part of them that lies where the camera saw through.
+        occluded: part of them that lies behind something.
+    """
+
+    information: Array
+    gradient: Array
+    residual: float
+    num_points: float
+    seen: float
+    in_free: float
+    occluded: float
+
+
+class BodyEvidence:
+    """The evidence of one moment's images about some bodies, ready to be asked at any poses.
+
+    Args:
+        bodies: the bodies looked for.
+        views: the images, all of one moment.
+        occluders: fields of other bodies in the way, each with its pose in W.
+        config: how to read the images.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        views: Sequence[DepthView],
+        occluders: Sequence[tuple[DistanceField, RigidTransform]],
+        config: EvidenceConfig,
+    ) -> None:
+        self._fields = [body.field.core for body in bodies]
+        self._samples = [(body.points, body.normals) for body in bodies]
+        self._views = [view.native() for view in views]
+        self._other_fields = [field.core for field, _ in occluders]
+        self._X_WK = np.array([X_WK.GetAsMatrix4() for _, X_WK in occluders]).reshape(-1, 4, 4)
+        self._config = config
+
+    def points_near(self, X_WB: Array) -> Array:
+        """(M, 3) points in W measured near the bodies at their predicted poses X_WB (L, 4, 4)."""
+        config = self._config
+        return _core.points_near_bodies(
+            self._views,
+            self._fields,
+            X_WB,
+            self._other_fields,
+            self._X_WK,
+            config.max_distance,
+            config.occluder_margin,
+            config.max_pixels,
+        )
+
+    def at(self, points: Array, X_WB: Array, loss_scale: float) -> Evidence:
+        """The evidence at poses X_WB (L, 4, 4), by points (M, 3) in W and the free space."""
+        config = self._config
+        information, gradient, sums, counts = _core.body_terms(
+            points,
+            self._fields,
+            X_WB,
+            RobustLoss.GEMAN_MCCLURE.value,
+            loss_scale,
+            self._views,
+            self._samples,
+            config.margin,
+            config.max_violation,
+            config.search_radius,
+            config.free_space_weight,
+        )
+        weight = 1 / (config.noise**2 * config.correlation)
+        _, num_points, squares = sums.sum(axis=0)
+        facing, seen, in_free, occluded, _ = counts.sum(axis=0)
+        facing = max(facing, 1.0)
+        return Evidence(
+            weight * information,
+            weight * gradient,
+            float(np.sqrt(squares / num_points)) if num_points > 0 else np.nan,
+            float(num_points),
+            float(seen / facing),
+            float(in_free / facing),
+            float(occluded / facing),
+        )
+
+    def loss_scale(self, iteration: int) -> float:
+        """The loss's scale at an iteration: halved each time, from max_distance down [m]."""
+        return max(self._config.loss_scale, self._config.max_distance * 0.5**iteration)
