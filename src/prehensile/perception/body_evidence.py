@@ -43,7 +43,9 @@ class EvidenceConfig:
     Attributes:
         noise: standard deviation of a measured point across the surface [m], > 0.
         correlation: how many points count as one, because neighbours err together, >= 1.
-        max_distance: points further from the predicted surface are not looked at [m], > 0.
+        max_distance: points further from the predicted surface are not looked at [m], > 0; where
+            the prediction is less sure than that, two of its standard deviations.
+        farthest: but never further than this [m], > 0.
         loss_scale: scale of the Geman-McClure loss once the fit settles [m], > 0; it starts at
             max_distance.
         max_pixels: pixels looked at per image, >= 1.
@@ -56,10 +58,11 @@ class EvidenceConfig:
     """
 
     noise: float = 0.002
-    correlation: float = 20.0
+    correlation: float = 10.0
     max_distance: float = 0.03
+    farthest: float = 0.12
     loss_scale: float = 0.005
-    max_pixels: int = 4000
+    max_pixels: int = 12000
     margin: float = 0.01
     max_violation: float = 0.03
     search_radius: int = 12
@@ -72,7 +75,7 @@ class EvidenceConfig:
         Raises:
             ValueError: naming the field.
         """
-        for name in ("noise", "max_distance", "loss_scale", "max_violation"):
+        for name in ("noise", "max_distance", "farthest", "loss_scale", "max_violation"):
             if not 0 < getattr(self, name) < np.inf:
                 raise ValueError(f"{name}: must be positive, not {getattr(self, name)}")
         if not 1 <= self.correlation < np.inf:
@@ -126,7 +129,7 @@ class BodyEvidence:
         self._X_WK = np.array([X_WK.GetAsMatrix4() for _, X_WK in occluders]).reshape(-1, 4, 4)
         self._config = config
 
-    def points_near(self, X_WB: Array) -> Array:
+    def points_near(self, X_WB: Array, max_distance: float) -> Array:
         """(M, 3) points in W measured near the bodies at their predicted poses X_WB (L, 4, 4)."""
         config = self._config
         return _core.points_near_bodies(
@@ -135,10 +138,15 @@ class BodyEvidence:
             X_WB,
             self._other_fields,
             self._X_WK,
-            config.max_distance,
+            max_distance,
             config.occluder_margin,
             config.max_pixels,
         )
+
+    def gate(self, deviation: float) -> float:
+        """How far from the predicted surface to look if it is so unsure [m]."""
+        config = self._config
+        return max(config.max_distance, min(2 * deviation, config.farthest))
 
     def at(self, points: Array, X_WB: Array, loss_scale: float) -> Evidence:
         """The evidence at poses X_WB (L, 4, 4), by points (M, 3) in W and the free space."""
@@ -170,6 +178,6 @@ class BodyEvidence:
             float(occluded / facing),
         )
 
-    def loss_scale(self, iteration: int) -> float:
+    def loss_scale(self, iteration: int, max_distance: float) -> float:
         """The loss's scale at an iteration: halved each time, from max_distance down [m]."""
-        return max(self._config.loss_scale, self._config.max_distance * 0.5**iteration)
+        return max(self._config.loss_scale, max_distance * 0.5**iteration)

@@ -56,9 +56,9 @@ class TrackerConfig:
     acceleration: float = 5.0
     initial_pose: tuple[float, float] = (0.1, 0.01)
     initial_velocity: tuple[float, float] = (2.0, 0.5)
-    max_iterations: int = 8
+    max_iterations: int = 12
     min_seen: float = 0.1
-    max_in_free: float = 0.4
+    max_in_free: float = 0.15
     max_coasting: float = 0.5
     velocity_decay: float = 0.2
 
@@ -163,7 +163,8 @@ def track_object(
     data = BodyEvidence([body], views, occluders, config.evidence)
     R, p, covariance, evidence, iterations = _corrected(predicted, data, config)
     visible = evidence.seen + evidence.in_free
-    contradicted = visible > 0 and evidence.in_free > config.max_in_free * visible
+    strictness = 1.0 if state.status is TrackingStatus.TRACKING else 0.5
+    contradicted = evidence.in_free > strictness * config.max_in_free * visible
     if evidence.seen >= config.min_seen and not contradicted:
         return _updated(predicted, R, p, covariance, evidence, iterations)
     coasting = state.coasting + time - state.time
@@ -190,16 +191,20 @@ def _corrected(
     p_0 = np.array(predicted.X_WO.translation())
     prior = np.linalg.inv(predicted.covariance[:6, :6])
     R, p = R_0, p_0
-    points, gathered_at = data.points_near(_matrix(R, p)), p
+    gate = data.gate(float(np.sqrt(np.diag(predicted.covariance)[3:6].max())))
+    points, gathered_at = data.points_near(_matrix(R, p), gate), p
     iterations = 0
     for iterations in range(1, config.max_iterations + 1):
-        if np.linalg.norm(p - gathered_at) > 0.3 * config.evidence.max_distance:
-            points, gathered_at = data.points_near(_matrix(R, p)), p
-        here = data.at(points, _matrix(R, p), data.loss_scale(iterations - 1))
+        if np.linalg.norm(p - gathered_at) > 0.3 * gate:
+            points, gathered_at = data.points_near(_matrix(R, p), gate), p
+        if not len(points):
+            break
+        scale = data.loss_scale(iterations - 1, gate)
+        here = data.at(points, _matrix(R, p), scale)
         offset = np.concatenate([Rotation.from_matrix(R @ R_0.T).as_rotvec(), p - p_0])
         step = -np.linalg.solve(prior + here.information[0], here.gradient[0] + prior @ offset)
         R, p = _moved(R, p, step)
-        settled = data.loss_scale(iterations) == data.loss_scale(iterations - 1)
+        settled = scale == config.evidence.loss_scale
         if settled and np.abs(step[:3]).max() < 1e-4 and np.abs(step[3:]).max() < 1e-5:
             break
     evidence = data.at(points, _matrix(R, p), config.evidence.loss_scale)

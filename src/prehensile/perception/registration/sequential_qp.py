@@ -127,7 +127,7 @@ def minimize_over_poses(
         H = scaled.T @ here.information @ scaled
         b = scaled.T @ here.gradient
         H = H + (damping * max(np.trace(H), 1e-300) + 1e-300) * np.eye(len(H))
-        step, multipliers = _constrained_step(H, b, A @ scaled, -gaps)
+        step, multipliers = constrained_step(H, b, A @ scaled, -gaps)
         price = max(price, 2.0 * float(multipliers.max(initial=0.0)))
         motion = scaled @ step
         size = float(np.linalg.norm(step)) / length_scale
@@ -161,7 +161,7 @@ def _linearized(
     return np.concatenate([turning, sliding], axis=2).reshape(-1, 6), gaps.reshape(-1)
 
 
-def _constrained_step(H: Array, b: Array, A: Array, c: Array) -> tuple[Array, Array]:
+def constrained_step(H: Array, b: Array, A: Array, c: Array) -> tuple[Array, Array]:
     """The d with A d >= c that minimizes d . H d / 2 + b . d, and the multipliers.
 
     Where no d satisfies the constraints, the step that best undoes the violations.
