@@ -5,9 +5,11 @@ PYTHON ?= python3
 NATIVE := pyproject.toml CMakeLists.txt $(shell find cpp -name '*.cpp' -o -name '*.h' -o -name CMakeLists.txt)
 CPP := $(filter %.cpp %.h,$(NATIVE))
 RUN := .venv/bin
+PERCEPTION := fusion voxel normals icp refinement global_registration robust_registration \
+  point_drift tracking
 PIP = $(RUN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help demo test test-all test-cpp sanitize bench docs examples lint format models clean
+.PHONY: help demo test test-all test-cpp sanitize bench bench-perception docs examples lint format models clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1|/' | column -t -s '|'
@@ -28,6 +30,9 @@ sanitize: build/sanitized/.tested  ## the same with AddressSanitizer and Undefin
 
 bench: .venv/.installed  ## our speed beside the peers', each in a virtual environment of its own
 	$(RUN)/prehensile bench
+
+bench-perception: .venv/.installed  ## the same for chapter 4: clouds, registration, tracking
+	$(RUN)/prehensile bench $(PERCEPTION)
 
 docs: .venv/.docs build/examples/.run  ## the documentation as web pages, in site/
 	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --strict --quiet

@@ -9,13 +9,15 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr|data):<code>(~?)([\w.]+)</code>")
-FIGURE = re.compile(r'save_figure\(.*?"(\w+)",?\s*\)', re.DOTALL)
+FIGURE = re.compile(r'save_(figure|animation)\(.*?"(\w+)",?\s*(?:period=[\d.]+,?\s*)?\)', re.DOTALL)
+SUFFIX = {"figure": "png", "animation": "gif"}
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "build" / "examples"
 CHAPTERS = {
     "ch01": "1 Introduction",
     "ch02": "2 Robots",
     "ch03": "3 Pick and place",
+    "ch04": "4 Geometric perception",
 }
 
 
@@ -47,7 +49,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     for path in sorted((ROOT / "examples").glob("*.py")):
         page = File.generated(config, f"examples/{path.stem}.md", content=_page(path))
         files.append(page)
-        for picture in sorted((FIGURES / path.stem).glob("*.png")):
+        for picture in sorted((FIGURES / path.stem).glob("*.*")):
             uri = f"examples/{path.stem}/{picture.name}"
             files.append(File.generated(config, uri, abs_src_path=str(picture)))
     return files
@@ -74,7 +76,7 @@ def _page(path: Path) -> str:
             out.append(re.sub(r"\$(.+?)\$", _formula, text, flags=re.DOTALL))
             continue
         out.append(f"```python\n{body.strip()}\n```")
-        for name in FIGURE.findall(body):
-            out.append(f"![{name.replace('_', ' ')}]({path.stem}/{name}.png)")
+        for kind, name in FIGURE.findall(body):
+            out.append(f"![{name.replace('_', ' ')}]({path.stem}/{name}.{SUFFIX[kind]})")
     out.append(f"*The file is `examples/{path.name}`; `.venv/bin/python` runs it.*")
     return "\n\n".join(out)

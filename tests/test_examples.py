@@ -16,14 +16,15 @@ from PIL import Image
 from prehensile.viz.figures import FOLDER_VARIABLE
 
 ROOT = Path(__file__).parents[1]
-FIGURE = re.compile(r'save_figure\(.*?"(\w+)",?\s*\)', re.DOTALL)
+FIGURE = re.compile(r'save_(figure|animation)\(.*?"(\w+)",?\s*(?:period=[\d.]+,?\s*)?\)', re.DOTALL)
+SUFFIX = {"figure": "png", "animation": "gif"}
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_example(path, monkeypatch, tmp_path):
     folder = ROOT / "build" / "examples" / path.stem
-    for old in folder.glob("*.png"):
+    for old in folder.glob("*.*"):
         old.unlink()
     monkeypatch.setenv(FOLDER_VARIABLE, str(folder))
     monkeypatch.chdir(tmp_path)
@@ -33,11 +34,11 @@ def test_example(path, monkeypatch, tmp_path):
         runpy.run_path(str(path), run_name="__main__")
     finally:
         plt.close("all")
-    wanted = set(FIGURE.findall(path.read_text()))
-    drawn = {picture.stem for picture in folder.glob("*.png")}
+    wanted = {f"{name}.{SUFFIX[kind]}" for kind, name in FIGURE.findall(path.read_text())}
+    drawn = {picture.name for picture in folder.glob("*.*")}
     assert drawn
     assert wanted == drawn
-    for picture in folder.glob("*.png"):
+    for picture in folder.glob("*.*"):
         pixels = np.asarray(Image.open(picture).convert("L"), float)
         assert pixels.std() > 2.0, f"{picture.name} is blank"
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image, ImageSequence
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import SpatialInertia
@@ -9,7 +10,7 @@ from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from prehensile.viz.figures import save_figure
+from prehensile.viz.figures import save_animation, save_figure
 from prehensile.viz.images import project
 from prehensile.viz.render import look_at, render
 
@@ -84,3 +85,15 @@ def test_figures_go_where_the_environment_says(tmp_path, monkeypatch):
     assert save_figure(picture, "black") == tmp_path / "there" / "black.png"
     assert (tmp_path / "there" / "black.png").read_bytes().startswith(b"\x89PNG")
     assert save_figure(picture, "black", tmp_path).parent == tmp_path
+
+
+def test_an_animation_holds_every_picture_in_order(tmp_path):
+    shades = [0, 90, 180, 250]
+    pictures = (np.full((8, 10, 3), shade, np.uint8) for shade in shades)
+    path = save_animation(pictures, "fade", tmp_path, period=0.2)
+    assert path == tmp_path / "fade.gif"
+    with Image.open(path) as gif:
+        frames = [np.asarray(f.convert("L"), float) for f in ImageSequence.Iterator(gif)]
+    assert [round(f.mean()) for f in frames] == shades
+    with pytest.raises(ValueError, match="pictures"):
+        save_animation([], "none", tmp_path)

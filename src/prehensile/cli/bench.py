@@ -14,7 +14,7 @@ from prehensile.errors import Finding, InputError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the command's arguments."""
-    parser.add_argument("name", nargs="?", help="the benchmark to run; all if not given")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="what to run; all if not given")
     parser.add_argument(
         "--rounds", type=int, default=3, metavar="N", help="how often each side runs, default 3"
     )
@@ -39,12 +39,13 @@ def run(args: argparse.Namespace) -> int:
     sys.path.insert(0, str(root))
     framework = importlib.import_module("benchmarks.framework")
     names = framework.names()
-    if args.name is not None and args.name not in names:
-        raise InputError(Finding(f"no benchmark {args.name!r}", f"there are: {', '.join(names)}"))
+    for name in args.names:
+        if name not in names:
+            raise InputError(Finding(f"no benchmark {name!r}", f"there are: {', '.join(names)}"))
 
     console = Console()
     status = 0
-    for name in [args.name] if args.name else names:
+    for name in args.names or names:
         module = importlib.import_module(f"benchmarks.{name}")
         console.print(f"[bold]{module.TITLE}[/bold]")
         results = framework.run(
