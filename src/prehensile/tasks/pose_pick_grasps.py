@@ -1,0 +1,145 @@
+"""Grasps of an object whose shape is known, in its own frame, from every side.
+
+Frames: O the object, G the hand, P the point between its pads (parallel to G).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+
+from prehensile.grasping.candidates import Candidates
+from prehensile.grasping.grasp import GraspConfig, GraspStatus
+from prehensile.grasping.gripper import ParallelGripper
+from prehensile.grasping.scoring import evaluate
+from prehensile.perception.cloud import PointCloud
+
+_VOXEL = 0.004
+_TURN = np.deg2rad(15)  # between neighbouring approaches about one closing axis
+_ARM_WEIGHT = 0.5  # score lost per 5 cm between the grasp and the vertical of the centre of mass
+_CONFIG = GraspConfig(
+    voxel_size=_VOXEL,
+    min_clearance=0.003,
+    weight_tilt=0.0,
+    weight_offset=0.0,
+    max_contact_angle=float(np.deg2rad(25)),
+)
+
+
+@dataclass(frozen=True)
+class ModelGrasp:
+    """A grasp in the frame of the object.
+
+    Attributes:
+        X_OG: pose of the hand.
+        width: opening command for the approach [m].
+        score: the higher the better; 1 is flawless.
+    """
+
+    X_OG: RigidTransform
+    width: float
+    score: float
+
+
+def model_grasps(
+    cloud_O: PointCloud,
+    p_OCm: NDArray[np.float64],
+    gripper: ParallelGripper,
+    *,
+    seed: int = 0,
+    num_seeds: int = 320,
+) -> list[ModelGrasp]:
+    """Antipodal grasps of a known object, best first.
+
+    Closing axes are the normals of points of its surface; about each the hand is turned all the way
+    round. Contacts, openings and collisions of the hand with the object are judged as for clouds
+    (:func:`prehensile.grasping.scoring.evaluate`), and a grasp loses by its distance from the
+    centre of mass, across the closing axis: so far the object's weight turns it in the hand.
+
+    Args:
+        cloud_O: the whole surface, one point per voxel of 4 mm, with normals, in O.
+        p_OCm: (3,) the centre of mass in O [m].
+        gripper: the hand.
+        seed: of the choice of points.
+        num_seeds: how many points to take.
+
+    Returns:
+        The grasps, none closer to a better one than 8 mm and 14 degrees.
+    """
+    rng = np.random.default_rng(seed)
+    normals = cloud_O.require_normals()
+    chosen = rng.choice(len(cloud_O), size=min(num_seeds, len(cloud_O)), replace=False)
+    turns = np.arange(0, 2 * np.pi - 1e-9, _TURN)
+    axes, points, seeds = [], [], []
+    for k, index in enumerate(chosen):
+        x = normals[index]
+        y0 = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
+        y0 /= np.linalg.norm(y0)
+        z0 = np.cross(x, y0)
+        y = np.cos(turns)[:, None] * y0 + np.sin(turns)[:, None] * z0
+        frame = np.stack([np.broadcast_to(x, y.shape), y, np.cross(x, y)], axis=-1)
+        axes.append(frame)
+        points.append(np.broadcast_to(cloud_O.points[index] - 0.5 * _VOXEL * x, y.shape))
+        seeds.append(np.full(len(turns), k))
+    candidates = Candidates(
+        np.concatenate(axes),
+        np.concatenate(points),
+        np.zeros(len(chosen) * len(turns), dtype=np.int64),
+        np.concatenate(seeds),
+    )
+    segments = np.zeros(len(cloud_O), dtype=np.int64)
+    found = evaluate(candidates, cloud_O, segments, gripper, [], _CONFIG)
+    feasible = np.nonzero(found.status == GraspStatus.FOUND)[0]
+    offset = np.linalg.norm(
+        np.cross(found.p_WP - p_OCm, candidates.R_WP[:, :, 0]), axis=1
+    )
+    score = found.score - _ARM_WEIGHT * offset / 0.05
+    order = feasible[np.argsort(-score[feasible], kind="stable")]
+    kept: list[int] = []
+    for i in order:
+        if not kept:
+            kept.append(i)
+            continue
+        near = np.linalg.norm(found.p_WP[kept] - found.p_WP[i], axis=1) < 0.008
+        # Half a turn about the approach exchanges the fingers: the same grasp.
+        d = np.sum(candidates.R_WP[kept] * candidates.R_WP[i], axis=1)
+        trace = d[:, 1] + np.abs(d[:, 0] + d[:, 2])
+        if not np.any(near & (0.5 * (trace - 1.0) > np.cos(np.deg2rad(14)))):
+            kept.append(i)
+    return [
+        ModelGrasp(
+            RigidTransform(
+                RotationMatrix.ProjectToRotationMatrix(candidates.R_WP[i]),
+                found.p_WP[i] - candidates.R_WP[i] @ gripper.p_GPad,
+            ),
+            float(found.width[i]),
+            float(score[i]),
+        )
+        for i in kept
+    ]
+
+
+def collision_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> PointCloud:
+    """A surface as points with normals, one per voxel of 4 mm.
+
+    Args:
+        vertices: (V, 3) [m].
+        faces: (F, 3), counter-clockwise seen from outside.
+    """
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(cross, axis=1)
+    faces, corners, cross, area = (a[area > 1e-12] for a in (faces, corners, cross, area))
+    rng = np.random.default_rng(0)
+    count = int(area.sum() / _VOXEL**2 * 20)
+    face = rng.choice(len(area), size=count, p=area / area.sum())
+    u, v = rng.random((2, count))
+    flip = u + v > 1
+    u[flip], v[flip] = 1 - u[flip], 1 - v[flip]
+    a, b, c = (corners[face, k] for k in range(3))
+    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    normals = cross[face] / (2 * area[face, None])
+    from prehensile.perception.fusion import downsample
+
+    return downsample(PointCloud(points, normals), _VOXEL)

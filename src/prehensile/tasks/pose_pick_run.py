@@ -1,0 +1,383 @@
+"""Pose-pick in simulation: the scene, the run, and what came of it against the ground truth."""
+
+import dataclasses as dc
+import math
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.planning import RobotDiagram
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.sensors import ImageDepth32F
+from scipy.spatial import cKDTree
+
+from prehensile.behavior.state_machine import Senses, StateMachine
+from prehensile.grasping import WSG50
+from prehensile.models.registry import find_model
+from prehensile.models.shapes.gltf import read_gltf
+from prehensile.planning.arm import ArmModel
+from prehensile.scenes.clutter import PlacedObject, with_objects
+from prehensile.station.build import build
+from prehensile.station.robot_plant import make_robot_diagram
+from prehensile.station.scenario import Scenario
+from prehensile.station.scenario_file import load_scenario
+from prehensile.tasks.clear_bin_run import bin_geometry
+from prehensile.tasks.pose_pick import Finder, KnownShape, Look, Memory, PosePick, Sight
+from prehensile.tasks.pose_pick_grasps import collision_cloud, model_grasps
+from prehensile.tasks.pose_pick_moves import TransferPlanner
+from prehensile.tasks.pose_pick_scene import random_rest_pose
+
+MODEL = "mustard_bottle"
+BODY_POSES = "body_poses"
+GRIP_FORCE = 80.0  # N, the most that the hand can
+GOAL_YAW = math.radians(135.0)
+POSE_TOLERANCE = 0.005  # m of ADD-S, within which a pose counts as right
+POSITION_TOLERANCE = 0.02  # m of the bottle's origin from its goal
+UPRIGHT_TOLERANCE = math.radians(5.0)
+_AT_REST = 0.01  # m/s and rad/s
+_STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C
+
+# Noise of the three cameras over the first bin, each with a seed of its own; and a fourth camera,
+# which checks the second bin.
+_OVERLAY = """
+depth_noise:
+  camera0: { seed: 0 }
+  camera1: { seed: 1 }
+  camera2: { seed: 2 }
+  camera3: { seed: 3 }
+cameras:
+  camera3:
+    name: camera3
+    width: 640
+    height: 480
+    focal: !FocalLength { x: 615.0, y: 615.0 }
+    z_near: 0.16
+    z_far: 10.0
+    depth: true
+    X_PB:
+      translation: [-0.42, 1.15, 0.75]
+      rotation: !Rpy { deg: [-131.34, 0.0, -144.09] }
+    renderer_class: !RenderEngineVtkParams { force_to_pbr: true }
+"""
+
+
+@dc.dataclass(frozen=True)
+class SeenPose:
+    """One look, held against the truth.
+
+    Attributes:
+        time: simulated seconds.
+        what: what was done about it: ``to the goal``, ``check``, ...
+        reason: why nothing was believed ("" if it was).
+        adds: mean distance of the model's points to those of the true object (ADD-S) [m]; NaN if
+            there was no pose.
+        see_wall: wall seconds of perception.
+        plan_wall: wall seconds of planning.
+    """
+
+    time: float
+    what: str
+    reason: str
+    adds: float
+    see_wall: float
+    plan_wall: float
+
+
+@dc.dataclass(frozen=True)
+class PosePickReport:
+    """Result of a run; what is said of poses and ends is the simulator's truth.
+
+    Attributes:
+        seed: of the scene and of every choice.
+        start: how the object was let go: ``upright``, ``leaning`` or ``fallen``.
+        X_WStart: where it then lay.
+        X_WGoal: where it was to stand.
+        X_WEnd: where it ended.
+        finished: why the run ended, in words.
+        accepted: whether the task's own check accepted the end.
+        failures: what went wrong on the way.
+        looks: every look.
+        phases: (time, state) of the state machine.
+        attempts: how often the object was to be moved.
+        distance: of the origin from the goal at the end [m].
+        tilt: angle to upright at the end [rad].
+        yaw: angle about the vertical from the goal, up to half a turn, by which the shape does not
+            change [rad].
+        at_rest: whether the object was at rest at the end.
+        released: whether the hand was clear of it at the end.
+        sim_time: simulated seconds.
+        wall_time: wall seconds of the simulation with perception and planning.
+        interrupted: the user stopped it.
+    """
+
+    seed: int
+    start: str
+    X_WStart: RigidTransform
+    X_WGoal: RigidTransform
+    X_WEnd: RigidTransform
+    finished: str
+    accepted: bool
+    failures: tuple[str, ...]
+    looks: tuple[SeenPose, ...]
+    phases: tuple[tuple[float, str], ...]
+    attempts: int
+    distance: float
+    tilt: float
+    yaw: float
+    at_rest: bool
+    released: bool
+    sim_time: float
+    wall_time: float
+    interrupted: bool = False
+
+    @property
+    def pose_right(self) -> bool:
+        """Whether the first pose that the task acted on was right: ADD-S under 5 mm."""
+        first = next((look for look in self.looks if not look.reason and look.what != "check"), None)
+        return first is not None and first.adds < POSE_TOLERANCE
+
+    @property
+    def placed(self) -> bool:
+        """Whether it stands within 2 cm of its goal, upright within 5 degrees, at rest, let go."""
+        stands = self.distance <= POSITION_TOLERANCE and self.tilt <= UPRIGHT_TOLERANCE
+        return stands and self.at_rest and self.released
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as plain JSON values, NaN as null."""
+
+        def plain(value: Any) -> Any:
+            if isinstance(value, RigidTransform):
+                return value.GetAsMatrix4().tolist()
+            if isinstance(value, (list, tuple)):
+                return [plain(item) for item in value]
+            if isinstance(value, SeenPose):
+                return {key: plain(item) for key, item in vars(value).items()}
+            if isinstance(value, float):
+                return value if math.isfinite(value) else None
+            return value
+
+        own = {key: plain(value) for key, value in vars(self).items()}
+        return {"task": "pose-pick", "placed": self.placed, "pose_right": self.pose_right} | own
+
+
+class TrueFinder:
+    """Knows where the object is without looking; for tests of the rest."""
+
+    def __init__(self, body: int) -> None:
+        """Makes it, for the body with an index."""
+        self._body = body
+
+    def find(self, senses: Senses) -> Sight:
+        """The true pose."""
+        return Sight(senses.image(BODY_POSES)[self._body])
+
+    def check(self, senses: Senses, X_WGuess: RigidTransform) -> Sight:
+        """The true pose."""
+        return self.find(senses)
+
+
+def load_surface(model: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices (V, 3) in O [m] and faces (F, 3) of an embedded model's surface."""
+    path = find_model(model).path.with_suffix(".gltf")
+    vertices, faces, count = [], [], 0
+    for part in read_gltf(path):
+        vertices.append(part.mesh.vertices)
+        faces.append(part.mesh.faces + count)
+        count += len(part.mesh.vertices)
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def load_pose_pick_scenario() -> Scenario:
+    """The shipped station ``two_bins`` with noisy cameras, and a fourth one over the second bin."""
+    return load_scenario("two_bins", data=_OVERLAY)
+
+
+class PosePickRun:
+    """A station with one object in its first bin, and the task that sets it into the second.
+
+    Attributes:
+        start: the object as it lies at the start.
+        diagram: the station and the state machine.
+    """
+
+    def __init__(
+        self,
+        *,
+        seed: int,
+        cheat: bool = False,
+        scenario: Scenario | None = None,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        """Lets the object settle and builds the station around it.
+
+        Args:
+            seed: of the scene, the cameras' noise and every choice of the task.
+            cheat: tell the task the true pose instead of letting it look.
+            scenario: a scenario like :func:`load_pose_pick_scenario`'s, which is the default.
+            meshcat: where to show it; nothing is shown if None.
+
+        Raises:
+            InputError: the object does not stay in the bin.
+        """
+        scenario = scenario or load_pose_pick_scenario()
+        noise = {
+            key: dc.replace(config, seed=config.seed + 1000 * seed)
+            for key, config in scenario.depth_noise.items()
+        }
+        scenario = dc.replace(scenario, depth_noise=noise)
+        world = make_robot_diagram(scenario)
+        pick_bin, place_bin = (bin_geometry(world, name) for name in ("bin0", "bin1"))
+        vertices, faces = load_surface(MODEL)
+        self._seed = seed
+        self.start = random_rest_pose(MODEL, vertices, pick_bin.X_WB, scenario, seed=seed)
+        placed = PlacedObject(f"{MODEL}_0", MODEL, self.start.X_WO)
+        scenario = dc.replace(scenario, directives=with_objects(scenario.directives, [placed]))
+        builder = DiagramBuilder()
+        self.station: Diagram = builder.AddSystem(build(scenario, meshcat=meshcat))
+        plant = self.station.GetSubsystemByName("plant")
+        self._plant = plant
+        self._body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName(placed.name))
+
+        cloud_O = collision_cloud(vertices, faces)
+        p_OCm = self._body.default_com()
+        p_WGoal = place_bin.X_WB.translation().copy()
+        p_WGoal[2] = place_bin.floor_height - vertices[:, 2].min()
+        self.X_WGoal = RigidTransform(RotationMatrix.MakeZRotation(GOAL_YAW), p_WGoal)
+        half_turn = RotationMatrix.MakeZRotation(np.pi)
+        half_extent = 0.5 * np.ptp(vertices, axis=0)
+        shape = KnownShape(cloud_O, half_extent, [RotationMatrix(), half_turn])
+        arm = ArmModel(world)
+        grasps = model_grasps(cloud_O, p_OCm, WSG50)
+        walls = [*pick_bin.walls, *place_bin.walls]
+        planner = TransferPlanner(arm, grasps, vertices, WSG50, walls)
+        finder: Finder = TrueFinder(int(self._body.index()))
+        task = PosePick(
+            arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed
+        )
+        names = list(scenario.cameras)
+        inputs = {f"{name}.depth_image": AbstractValue.Make(ImageDepth32F()) for name in names}
+        inputs |= {f"{name}.X_WC": AbstractValue.Make(RigidTransform()) for name in names}
+        sources = {name: name for name in inputs}
+        if cheat:
+            inputs[BODY_POSES] = AbstractValue.Make([RigidTransform()])
+            sources["cheat.body_poses"] = BODY_POSES
+        self._machine = builder.AddNamedSystem(
+            "pose_pick",
+            StateMachine(
+                task,
+                initial_position=arm.q_default,
+                initial_width=WSG50.max_width,
+                image_ports=inputs,
+            ),
+        )
+        force = builder.AddNamedSystem("grip_force", ConstantVectorSource([GRIP_FORCE]))
+        builder.Connect(force.get_output_port(), self.station.GetInputPort("wsg.force_limit"))
+        sources |= {"iiwa.position_measured": "position_measured", "wsg.state_measured": "hand_state"}
+        for source, target in sources.items():
+            builder.Connect(self.station.GetOutputPort(source), self._machine.GetInputPort(target))
+        for source, target in {"position": "iiwa.position", "width": "wsg.position"}.items():
+            builder.Connect(self._machine.GetOutputPort(source), self.station.GetInputPort(target))
+        self.diagram = builder.Build()
+        self.simulator = Simulator(self.diagram)
+        ApplySimulatorConfig(scenario.simulator_config, self.simulator)
+        self.simulator.set_target_realtime_rate(0.0)  # as fast as can be
+        self._model_points = cloud_O.points
+        self._wall = 0.0
+        self._seen: list[SeenPose] = []
+
+    def advance(self) -> bool:
+        """Simulates a tenth of a second; returns whether the task goes on."""
+        started = time.perf_counter()
+        X_WO = self.X_WO
+        self.simulator.AdvanceTo(self.time + _STEP)
+        self._wall += time.perf_counter() - started
+        for look in self.memory.looks[len(self._seen) :]:
+            self._seen.append(self._against_truth(look, X_WO))
+        return not self.memory.finished
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the start."""
+        return self.simulator.get_context().get_time()
+
+    @property
+    def X_WO(self) -> RigidTransform:
+        """Where the object truly is."""
+        context = self._plant.GetMyContextFromRoot(self.simulator.get_context())
+        return self._plant.EvalBodyPoseInWorld(context, self._body)
+
+    @property
+    def memory(self) -> Memory:
+        """What the task remembers now."""
+        return self._status().decision.memory
+
+    @property
+    def state(self) -> str:
+        """Name of the state that the task is in."""
+        return self._status().decision.state
+
+    def _status(self):
+        context = self._machine.GetMyContextFromRoot(self.simulator.get_context())
+        return self._machine.status(context)
+
+    def station_context(self) -> Context:
+        """The station's context, to read its ports."""
+        return self.station.GetMyContextFromRoot(self.simulator.get_context())
+
+    def _against_truth(self, look: Look, X_WO: RigidTransform) -> SeenPose:
+        sight = look.sight
+        error = math.nan
+        if sight.X_WO is not None:
+            error = adds(self._model_points, X_WO, sight.X_WO)
+        return SeenPose(look.time, look.plan, sight.reason, error, look.see_wall, look.plan_wall)
+
+    def report(self, *, interrupted: bool = False) -> PosePickReport:
+        """What has come of it up to now."""
+        memory, X_WEnd = self.memory, self.X_WO
+        context = self._plant.GetMyContextFromRoot(self.simulator.get_context())
+        V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, self._body).get_coeffs()
+        offset = X_WEnd.translation() - self.X_WGoal.translation()
+        R = self.X_WGoal.rotation().matrix().T @ X_WEnd.rotation().matrix()
+        yaw = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
+        hand = self._plant.GetBodyByName("body", self._plant.GetModelInstanceByName("wsg"))
+        p_WG = self._plant.EvalBodyPoseInWorld(context, hand).translation()
+        apart = float(np.linalg.norm(X_WEnd.translation() - p_WG))
+        return PosePickReport(
+            seed=self._seed,
+            start=self.start.start,
+            X_WStart=self.start.X_WO,
+            X_WGoal=self.X_WGoal,
+            X_WEnd=X_WEnd,
+            finished=memory.finished or ("interrupted" if interrupted else "time is up"),
+            accepted=memory.placed,
+            failures=memory.failures,
+            looks=tuple(self._seen),
+            phases=self._status().history,
+            attempts=memory.attempts,
+            distance=float(np.linalg.norm(offset)),
+            tilt=float(np.arccos(np.clip(R[2, 2], -1.0, 1.0))),
+            yaw=abs((yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi),
+            at_rest=bool(np.abs(V_WO).max() < _AT_REST),
+            released=apart > 0.25,
+            sim_time=self.time,
+            wall_time=self._wall,
+            interrupted=interrupted,
+        )
+
+
+def adds(
+    points_O: NDArray[np.float64], X_WO: RigidTransform, X_WOEstimated: RigidTransform
+) -> float:
+    """Mean distance of points (N, 3) of a model to the nearest of the model where it truly is [m].
+
+    The measure ADD-S of Hinterstoisser et al. (ACCV 2012), for which symmetric poses are the same.
+    """
+    tree = cKDTree(X_WO.multiply(points_O.T).T)
+    return float(tree.query(X_WOEstimated.multiply(points_O.T).T)[0].mean())
