@@ -612,9 +612,7 @@ def fuse_depth(
     limits: tuple[float, float, int, float, float, float, float],
     num_threads: int,
     simd: str | None = None,
-) -> tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8] | None
-]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8] | None]:
     """Points, normals, sensor origins (V, 3) in W, and colors or None."""
 
 def unproject_depth(
@@ -629,3 +627,102 @@ def depth_normals(
     num_threads: int,
     simd: str | None = None,
 ) -> NDArray[np.float64]: ...
+def normals_within_radius(
+    points: ArrayLike, radius: float, num_threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normals (N, 3) and surface variations (N,)."""
+
+def normals_of_nearest(
+    points: ArrayLike, neighbors: int | None, num_threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normals (N, 3) and surface variations (N,)."""
+
+# Consensus among correspondences (prehensile/consensus.h).
+class ConsistencyGraph:
+    """An undirected graph without loops, its adjacency matrix one bit per pair."""
+
+    @staticmethod
+    def from_edges(num_vertices: int, edges: ArrayLike) -> ConsistencyGraph:
+        """Of pairs of vertices (E, 2); at most 2^15 vertices."""
+    @property
+    def num_vertices(self) -> int: ...
+    @property
+    def num_edges(self) -> int: ...
+    def adjacent(self, i: int, j: int) -> bool: ...
+    def degrees(self) -> NDArray[np.int32]: ...
+    def edges(self) -> NDArray[np.int32]:
+        """(E, 2), each once, its smaller vertex first."""
+
+def consistency_graph(
+    model_points: ArrayLike,
+    scene_points: ArrayLike,
+    tolerance: float,
+    scale: float,
+    min_length: float,
+    simd: str | None = None,
+) -> ConsistencyGraph: ...
+def maximum_clique(
+    graph: ConsistencyGraph, exact: bool, min_size: int, max_nodes: int, time_limit: float
+) -> tuple[NDArray[np.int32], bool, int]:
+    """Vertices, proven, nodes."""
+
+def vote(
+    values: ArrayLike, bounds: ArrayLike, most_inliers: bool
+) -> tuple[float, NDArray[np.uint8], float]:
+    """Estimate, inliers, cost."""
+
+def vote_for_scale(
+    model_points: ArrayLike, scene_points: ArrayLike, noise_bound: float
+) -> tuple[float, NDArray[np.uint8], float]: ...
+def gnc_rotation(
+    model_vectors: ArrayLike, scene_vectors: ArrayLike, bound: float, max_iterations: int
+) -> tuple[NDArray[np.float64], NDArray[np.uint8], float, int, bool]:
+    """R_WO, inliers, cost, iterations, converged."""
+
+def log_false_alarms(num_tests: float, n: int, k: int, chance: float) -> float: ...
+def robust_registration(
+    model_points: ArrayLike,
+    scene_points: ArrayLike,
+    noise_bound: float,
+    max_nodes: int,
+    ambiguity_ratio: float,
+    max_false_alarms: float,
+    min_inliers: int,
+) -> tuple[int, NDArray[np.float64], NDArray[np.uint8], int, int, int, bool, int, float]:
+    """Status (found, no consensus, ambiguous), X_WO, inliers, their number, that of a second pose,
+    size of the clique, whether it is proven, iterations, log10 of the false alarms."""
+
+def ransac_pose(
+    model_points: ArrayLike,
+    scene_points: ArrayLike,
+    max_distance: float,
+    seed: int,
+    max_samples: int,
+    confidence: float,
+) -> tuple[NDArray[np.float64], NDArray[np.uint8], int, int, int, bool, float]:
+    """X_WO, inliers, their number, samples, poses, confident, log10 of the false alarms."""
+
+# Coherent point drift.
+
+class GaussianSums:
+    def __init__(self, points: ArrayLike) -> None: ...
+    def __len__(self) -> int: ...
+    def at(
+        self, queries: ArrayLike, sigma: float, floor: float, num_threads: int
+    ) -> NDArray[np.float64]: ...
+
+def spatial_order(points: ArrayLike) -> NDArray[np.int32]: ...
+def coherent_point_drift(
+    scene: ArrayLike,
+    model: ArrayLike,
+    X_WO_guess: object,
+    *,
+    dimension: int,
+    outlier_weight: float,
+    outlier_volume: float,
+    sigma: float,
+    max_iterations: int,
+    tolerance: float,
+    keep_history: bool,
+    num_threads: int,
+) -> dict[str, Any]: ...
