@@ -154,16 +154,16 @@ nb::tuple RotationOf(nb::handle model_vectors, nb::handle scene_vectors, double 
 }
 
 nb::tuple Robust(nb::handle model_points, nb::handle scene_points, double noise_bound,
-                 std::int64_t max_nodes, double ambiguity_ratio, double max_chance,
+                 std::int64_t max_nodes, double ambiguity_ratio, double max_false_alarms,
                  int min_inliers) {
   const Correspondences points(model_points, scene_points);
   const RobustPose pose = Released([&] {
     return RobustRegistration(points.model.rows(), points.scene.rows(), noise_bound,
-                              {max_nodes, ambiguity_ratio, max_chance, min_inliers});
+                              {max_nodes, ambiguity_ratio, max_false_alarms, min_inliers});
   });
   return nb::make_tuple(static_cast<int>(pose.status), Pose(pose.R, pose.p), Flags(pose.inliers),
                         pose.num_inliers, pose.num_inliers_second, pose.clique_size,
-                        pose.clique_proven, pose.iterations, pose.log_chance);
+                        pose.clique_proven, pose.iterations, pose.log_false_alarms);
 }
 
 nb::tuple Ransac(nb::handle model_points, nb::handle scene_points, double max_distance,
@@ -174,7 +174,7 @@ nb::tuple Ransac(nb::handle model_points, nb::handle scene_points, double max_di
                               {seed, max_samples, confidence});
   });
   return nb::make_tuple(Pose(pose.R, pose.p), Flags(pose.inliers), pose.num_inliers, pose.samples,
-                        pose.poses, pose.confident, pose.log_chance);
+                        pose.poses, pose.confident, pose.log_false_alarms);
 }
 
 }  // namespace
@@ -198,9 +198,9 @@ void BindConsensus(nb::module_& m) {
   m.def("vote_for_scale", &ScaleOf, "model_points"_a, "scene_points"_a, "noise_bound"_a);
   m.def("gnc_rotation", &RotationOf, "model_vectors"_a, "scene_vectors"_a, "bound"_a,
         "max_iterations"_a);
-  m.def("log_chance_sets", &LogChanceSets, "n"_a, "k"_a, "p"_a);
+  m.def("log_false_alarms", &LogFalseAlarms, "num_tests"_a, "n"_a, "k"_a, "chance"_a);
   m.def("robust_registration", &Robust, "model_points"_a, "scene_points"_a, "noise_bound"_a,
-        "max_nodes"_a, "ambiguity_ratio"_a, "max_chance"_a, "min_inliers"_a);
+        "max_nodes"_a, "ambiguity_ratio"_a, "max_false_alarms"_a, "min_inliers"_a);
   m.def("ransac_pose", &Ransac, "model_points"_a, "scene_points"_a, "max_distance"_a, "seed"_a,
         "max_samples"_a, "confidence"_a);
 }

@@ -33,10 +33,15 @@ int RefineOnInliers(const PointRows& a, const PointRows& b, double bound, Pose* 
 /// Least-squares pose of the rows named.
 Pose FitPose(const PointRows& a, const PointRows& b, const int* rows, int count);
 
-/// Part of random pairs of pairs (i, j), (k, l) for which |a_i - a_j| and |b_k - b_l| differ by the
-/// tolerance or less: how often two wrong correspondences are consistent. At least 3 in the number
-/// of samples, the rule of three.
-double ChanceOfConsistency(const PointRows& a, const PointRows& b, double tolerance);
+/// Expected number of triples of wrong correspondences that are consistent by their distances:
+/// bounded by two of the distances, since the third depends on them.
+double ExpectedTriples(const PointRows& a, const PointRows& b, double tolerance);
+
+/// Probability that a wrong correspondence agrees with a wrong pose, from the points wrongly
+/// matched, by the poses that half turns about the inliers' principal axes make of this one: they
+/// keep the clouds one on the other as well as a wrong pose can.
+double ChanceOfAgreement(const PointRows& a, const PointRows& b, const Pose& pose, double bound,
+                         const std::vector<std::uint8_t>& inliers);
 
 /// SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014).
 class SplitMix {

@@ -182,7 +182,8 @@ ConsistencyGraph MakeConsistencyGraph(const PointRows& a, const PointRows& b, do
       for (int w = 0; w < num_words; ++w) {
         for (std::uint64_t bits = graph.row(i)[w]; bits; bits &= bits - 1) {
           const int j = 64 * w + std::countr_zero(bits);
-          if ((a.row(i) - a.row(j)).norm() < min_length) {
+          const double length_a = (a.row(i) - a.row(j)).norm();
+          if (std::min(length_a, (b.row(i) - b.row(j)).norm()) < min_length) {
             graph.mutable_row(i)[w] &= ~(bits & -bits);
           }
         }

@@ -77,33 +77,84 @@ int RefineOnInliers(const PointRows& a, const PointRows& b, double bound, Pose* 
   return count;
 }
 
-double ChanceOfConsistency(const PointRows& a, const PointRows& b, double tolerance) {
+double ExpectedTriples(const PointRows& a, const PointRows& b, double tolerance) {
   constexpr int kSamples = 2048;
   const int n = static_cast<int>(a.rows());
-  if (n < 2) return 1;
+  if (n <= 3) return n == 3 ? 1 : 0;
+  // How often pairs {i, j} != {k, l} have |a_i - a_j| and |b_k - b_l| within the tolerance.
   SplitMix random(0);
-  const auto distance = [&](const PointRows& points) {
-    const int i = random.Below(n);
-    const int j = (i + 1 + random.Below(n - 1)) % n;
-    return (points.row(i) - points.row(j)).norm();
-  };
-  int hits = 3;
-  for (int k = 0; k < kSamples; ++k) {
-    const double length_a = distance(a), length_b = distance(b);
+  int hits = 3;  // None in so many samples leaves 3 in as many possible, at 95 % confidence.
+  for (int sample = 0; sample < kSamples; ++sample) {
+    const int i = random.Below(n), j = (i + 1 + random.Below(n - 1)) % n;
+    int k, l;
+    do {
+      k = random.Below(n);
+      l = (k + 1 + random.Below(n - 1)) % n;
+    } while ((k == i && l == j) || (k == j && l == i));
+    const double length_a = (a.row(i) - a.row(j)).norm();
+    const double length_b = (b.row(k) - b.row(l)).norm();
     hits += std::abs(length_a - length_b) <= tolerance;
   }
-  return std::min(1.0, static_cast<double>(hits) / kSamples);
+  const double p = std::min(1.0, static_cast<double>(hits) / kSamples);
+  return double(n) * (n - 1) * (n - 2) / 6 * p * p;
+}
+
+double ChanceOfAgreement(const PointRows& a, const PointRows& b, const Pose& pose, double bound,
+                         const std::vector<std::uint8_t>& inliers) {
+  constexpr int kPairs = 12'000;
+  const int n = static_cast<int>(a.rows());
+  Eigen::Matrix<double, Eigen::Dynamic, 3> moved =
+      (a * pose.R.transpose()).rowwise() + pose.p.transpose();
+  const Eigen::Matrix<double, Eigen::Dynamic, 3> scene = b;
+  Eigen::RowVector3d center = Eigen::RowVector3d::Zero();
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    if (!inliers[i]) continue;
+    center += moved.row(i);
+    ++count;
+  }
+  center /= std::max(count, 1);
+  moved.rowwise() -= center;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < n; ++i) {
+    if (inliers[i]) scatter += moved.row(i).transpose() * moved.row(i);
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(scatter, Eigen::ComputeFullU);
+  const int shifts = std::min(n - 1, (kPairs + n - 1) / n);
+  Eigen::Index hits = 3;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d u = svd.matrixU().col(axis);
+    const Eigen::Matrix3d half_turn = 2 * u * u.transpose() - Eigen::Matrix3d::Identity();
+    const Eigen::Matrix<double, Eigen::Dynamic, 3> turned = (moved * half_turn).rowwise() + center;
+    for (int s = 0; s < shifts; ++s) {
+      const int shift = 1 + static_cast<int>(std::int64_t(n - 1) * s / shifts);
+      const auto agreeing = [&](int from, int to, int rows) {
+        return ((turned.middleRows(from, rows) - scene.middleRows(to, rows))
+                    .rowwise()
+                    .squaredNorm()
+                    .array() <= bound * bound)
+            .count();
+      };
+      hits += agreeing(0, shift, n - shift) + agreeing(n - shift, 0, shift);
+    }
+  }
+  return std::min(1.0, static_cast<double>(hits) / (3.0 * shifts * n + 3));
 }
 
 }  // namespace internal
 
-double LogChanceSets(int n, int k, double p) {
-  internal::Require(0 <= k && k <= n, "k: must lie in [0, n]");
-  internal::Require(p >= 0 && p <= 1, "p: must be a probability");
-  double log_sets = 0;  // n choose k. (std::lgamma differs between libraries.)
-  for (int i = 0; i < k; ++i) log_sets += std::log10(double(n - i) / double(k - i));
-  const int distances = k < 3 ? k * (k - 1) / 2 : 3 * k - 6;
-  return distances ? log_sets + distances * std::log10(p) : log_sets;
+double LogFalseAlarms(double num_tests, int n, int k, double chance) {
+  internal::Require(3 <= k && k <= n, "k: must lie in [3, n]");
+  internal::Require(num_tests >= 0, "num_tests: must not be negative");
+  internal::Require(chance > 0 && chance <= 1, "chance: must lie in (0, 1]");
+  const double log_tests = std::log10(std::max(num_tests, 1.0));
+  const int others = n - 3, hits = k - 3;
+  if (hits <= others * chance || chance == 1) return log_tests;
+  double log_tail = hits * std::log10(chance) + (others - hits) * std::log10(1 - chance);
+  for (int i = 0; i < hits; ++i) log_tail += std::log10(double(others - i) / (hits - i));
+  // The terms that follow fall at least by this ratio.
+  const double ratio = (others - hits) * chance / ((hits + 1) * (1 - chance));
+  return log_tests + std::min(0.0, log_tail - std::log10(1 - ratio));
 }
 
 Vote VoteForScale(const PointRows& a, const PointRows& b, double noise_bound) {

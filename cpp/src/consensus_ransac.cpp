@@ -79,8 +79,9 @@ RansacPose RansacRegistration(const PointRows& a, const PointRows& b, double max
   if (result.num_inliers < 3) return result;
   result.num_inliers =
       internal::FindInliers(a, b, {result.R, result.p}, max_distance, &result.inliers);
-  result.log_chance =
-      LogChanceSets(n, result.num_inliers, internal::ChanceOfConsistency(a, b, 2 * max_distance));
+  result.log_false_alarms = LogFalseAlarms(
+      result.poses, n, result.num_inliers,
+      internal::ChanceOfAgreement(a, b, {result.R, result.p}, max_distance, result.inliers));
   return result;
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -64,6 +65,26 @@ bool FarApart(const PointRows& a, const Candidate& first, const Pose& second, do
   return sum > 4 * bound * bound * first.count;
 }
 
+/// Number of triangles; in large graphs estimated from those of every so many-th vertex.
+double CountTriangles(const ConsistencyGraph& graph) {
+  const double work = 2.0 * static_cast<double>(graph.num_edges()) * graph.words_per_row();
+  const int step = 1 + static_cast<int>(std::min(work / 1e6, graph.size() / 64.0));
+  double corners = 0, vertices = 0;
+  for (int i = 0; i < graph.size(); i += step, ++vertices) {
+    for (int w = 0; w < graph.words_per_row(); ++w) {
+      for (std::uint64_t word = graph.row(i)[w]; word; word &= word - 1) {
+        const std::uint64_t* const other = graph.row(64 * w + std::countr_zero(word));
+        int common = 0;
+        for (int k = 0; k < graph.words_per_row(); ++k) {
+          common += std::popcount(graph.row(i)[k] & other[k]);
+        }
+        corners += common / 2.0;
+      }
+    }
+  }
+  return corners / 3 * graph.size() / vertices;
+}
+
 void Remove(const std::vector<std::uint8_t>& removed, ConsistencyGraph* graph) {
   std::vector<std::uint64_t> kept(graph->words_per_row(), ~std::uint64_t{0});
   for (int i = 0; i < graph->size(); ++i) {
@@ -88,6 +109,7 @@ RobustPose RobustRegistration(const PointRows& a, const PointRows& b, double noi
   if (n < options.min_inliers) return result;
 
   ConsistencyGraph graph = MakeConsistencyGraph(a, b, 2 * noise_bound);
+  const double num_triangles = CountTriangles(graph);
   std::optional<Candidate> best;
   // One search for a pose and one for a rival, and some more where a clique was no pose: distances
   // do not tell a shape from its mirror image.
@@ -127,9 +149,11 @@ RobustPose RobustRegistration(const PointRows& a, const PointRows& b, double noi
   result.clique_size = static_cast<int>(best->clique.vertices.size());
   result.clique_proven = best->clique.proven;
   result.iterations = best->iterations;
-  result.log_chance =
-      LogChanceSets(n, best->count, internal::ChanceOfConsistency(a, b, 2 * noise_bound));
-  if (result.log_chance > std::log10(options.max_chance)) return result;
+  const double tests = std::min(num_triangles, internal::ExpectedTriples(a, b, 2 * noise_bound));
+  result.log_false_alarms =
+      LogFalseAlarms(tests, n, best->count,
+                     internal::ChanceOfAgreement(a, b, best->pose, noise_bound, result.inliers));
+  if (result.log_false_alarms > std::log10(options.max_false_alarms)) return result;
   const bool ambiguous = result.num_inliers_second >= options.ambiguity_ratio * best->count;
   result.status = ambiguous ? ConsensusStatus::kAmbiguous : ConsensusStatus::kFound;
   return result;

@@ -45,7 +45,8 @@ class ConsistencyGraph {
 /// evaluates it, whatever the SIMD level.
 ///
 /// @param a, b N corresponding points; both finite.
-/// @param min_length pairs of a nearer than this are not connected: they say nothing of a motion.
+/// @param min_length correspondences nearer to each other than this, in a or in b, are not
+/// connected.
 ConsistencyGraph MakeConsistencyGraph(const PointRows& a, const PointRows& b, double tolerance,
                                       double scale = 1, double min_length = 0,
                                       std::optional<SimdLevel> simd = {});
@@ -112,9 +113,14 @@ struct RotationConsensus {
 RotationConsensus GncRotation(const PointRows& a, const PointRows& b, double bound,
                               int max_iterations = 100);
 
-/// log10 of the number of sets of k among n correspondences that would be consistent with each
-/// other if pairs were so by chance with probability p: k points are rigid by 3 k - 6 distances.
-double LogChanceSets(int n, int k, double p);
+/// log10 of the expected number of poses, of so many that were tested, each fixed by three
+/// correspondences, with which k or more of n wrong correspondences would agree by chance: the
+/// number of tests times the binomial tail of the other n - 3 (the number of false alarms; Moisan
+/// and Stival, "A Probabilistic Criterion to Detect Rigid Point Matches Between Two Images and
+/// Estimate the Fundamental Matrix", IJCV 57(3), 2004).
+///
+/// @param chance probability that a wrong correspondence agrees with a pose, in (0, 1].
+double LogFalseAlarms(double num_tests, int n, int k, double chance);
 
 enum class ConsensusStatus : std::uint8_t { kFound, kNoConsensus, kAmbiguous };
 
@@ -123,8 +129,8 @@ struct RobustOptions {
   std::int64_t max_nodes = 20'000;
   /// A second pose with at least this part of the first one's inliers makes the answer ambiguous.
   double ambiguity_ratio = 0.8;
-  /// Expected number of consistent sets by chance above which a consensus is none.
-  double max_chance = 1e-3;
+  /// Expected number of equally good poses by chance above which a consensus is none.
+  double max_false_alarms = 1e-3;
   int min_inliers = 4;
 };
 
@@ -141,8 +147,8 @@ struct RobustPose {
   int num_inliers = 0, num_inliers_second = 0;
   /// Iterations of graduated non-convexity and of the refinement.
   int iterations = 0;
-  /// Expected number of sets of this size by chance, log10.
-  double log_chance = 0;
+  /// See LogFalseAlarms.
+  double log_false_alarms = 0;
 };
 
 /// A rigid motion b = R a + p from correspondences most of which are wrong, without a guess:
@@ -173,8 +179,8 @@ struct RansacPose {
   int samples = 0, poses = 0;
   /// Whether the confidence was reached.
   bool confident = false;
-  /// As RobustPose's.
-  double log_chance = 0;
+  /// See LogFalseAlarms.
+  double log_false_alarms = 0;
 };
 
 /// A rigid motion b = R a + p from three correspondences at a time, kept with the most

@@ -1,7 +1,18 @@
 """Poses of known objects in clouds: every method answers with a :class:`RegistrationResult`."""
 
+from prehensile.perception.registration.consistency import (
+    Clique,
+    ConsistencyGraph,
+    consistency_graph,
+    match_by_distances,
+    maximum_clique,
+)
 from prehensile.perception.registration.constraints import HalfSpaces, fit_rigid_constrained
 from prehensile.perception.registration.convex_constraints import ConvexFit, fit_rigid_convex
+from prehensile.perception.registration.gnc_rotation import (
+    RotationEstimate,
+    gnc_rotation,
+)
 from prehensile.perception.registration.icp import (
     IcpConfig,
     IcpDirection,
@@ -17,14 +28,30 @@ from prehensile.perception.registration.known import (
     fit_translation,
 )
 from prehensile.perception.registration.losses import RobustLoss
+from prehensile.perception.registration.ransac import (
+    ransac_pose,
+)
 from prehensile.perception.registration.result import (
     RegistrationResult,
     RegistrationStatus,
     pose_uncertainty,
 )
+from prehensile.perception.registration.robust import (
+    CorrespondenceResult,
+    RobustConfig,
+    register_correspondences,
+)
+from prehensile.perception.registration.voting import (
+    Vote,
+    vote,
+    vote_for_scale,
+)
 
 __all__ = [
+    "Clique",
+    "ConsistencyGraph",
     "ConvexFit",
+    "CorrespondenceResult",
     "HalfSpaces",
     "IcpConfig",
     "IcpDirection",
@@ -33,13 +60,24 @@ __all__ = [
     "RegistrationResult",
     "RegistrationStatus",
     "RigidFit",
+    "RobustConfig",
     "RobustLoss",
+    "RotationEstimate",
+    "Vote",
+    "consistency_graph",
     "fit_rigid",
     "fit_rigid_constrained",
     "fit_rigid_convex",
     "fit_rotation",
     "fit_translation",
+    "gnc_rotation",
     "icp",
     "icp_many_starts",
+    "match_by_distances",
+    "maximum_clique",
     "pose_uncertainty",
+    "ransac_pose",
+    "register_correspondences",
+    "vote",
+    "vote_for_scale",
 ]
