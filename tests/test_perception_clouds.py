@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from prehensile.errors import InputError
 from prehensile.perception import (
@@ -13,68 +13,10 @@ from prehensile.perception import (
     convex_segments,
     crop,
     downsample,
-    fuse_depth_images,
     inside_box,
     merge,
     resting_pairs,
 )
-
-K = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
-
-
-def looking_at(eye: np.ndarray, target: np.ndarray) -> RigidTransform:
-    """Pose of an optical frame at ``eye`` whose z axis points to ``target``, x horizontal."""
-    z = (target - eye) / np.linalg.norm(target - eye)
-    x = np.cross(z, [0.0, 0.0, 1.0])
-    x /= np.linalg.norm(x)
-    return RigidTransform(RotationMatrix(np.stack([x, np.cross(z, x), z], axis=1)), eye)
-
-
-def sphere_on_floor(X_WC: RigidTransform, centre: np.ndarray, radius: float) -> np.ndarray:
-    """Depth image of a sphere over the floor z = 0."""
-    v, u = np.mgrid[0:240, 0:320]
-    d_C = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(u.shape)], axis=-1)
-    d, o = d_C @ X_WC.rotation().matrix().T, X_WC.translation()
-    floor = np.where(d[..., 2] < 0, -o[2] / np.minimum(d[..., 2], -1e-9), np.inf)
-    a, b, c = np.sum(d * d, -1), d @ (o - centre), (o - centre) @ (o - centre) - radius**2
-    root = np.sqrt(np.maximum(b * b - a * c, 0))
-    ball = np.where(b * b > a * c, (-b - root) / a, np.inf)
-    return np.minimum(floor, ball).astype(np.float32)
-
-
-def test_fused_cloud_of_a_sphere_lies_on_it_with_outward_normals() -> None:
-    centre, radius, voxel = np.array([0.5, 0.1, 0.08]), 0.06, 0.005
-    eyes = np.array([[1.1, 0.1, 0.6], [0.2, 0.7, 0.6], [0.2, -0.5, 0.6]])
-    X_WCs = [looking_at(eye, centre) for eye in eyes]
-    depths = [sphere_on_floor(X, centre, radius) for X in X_WCs]
-    box = Box(RigidTransform([0.5, 0.1, 0.105]), np.array([0.2, 0.2, 0.2]))
-    cloud = fuse_depth_images(depths, [K] * 3, X_WCs, box, voxel)
-    assert inside_box(cloud.points, box).all()
-    outward = cloud.points - centre
-    distance = np.linalg.norm(outward, axis=1)
-    assert np.abs(distance - radius).max() < 0.001
-    error = np.degrees(
-        np.arccos(np.clip(np.sum(outward * cloud.require_normals(), axis=1) / distance, -1, 1))
-    )
-    assert np.median(error) < 2
-    assert error.max() < 15
-    # Seen from three sides, the ball is covered down to its equator and below.
-    azimuth = np.arctan2(outward[:, 1], outward[:, 0])[np.abs(outward[:, 2]) < 0.02]
-    assert np.diff(np.sort(azimuth)).max() < 0.3
-    # One point in each voxel.
-    cells = np.floor(cloud.points / voxel)
-    assert len(np.unique(cells, axis=0)) == len(cloud)
-
-
-def test_fusing_does_not_depend_on_a_box_behind_the_camera() -> None:
-    X_WC = looking_at(np.array([0.5, 0.0, 0.4]), np.array([0.5, 0.1, 0.0]))
-    depth = sphere_on_floor(X_WC, np.array([0.5, 0.1, 0.05]), 0.05)
-    near = Box(RigidTransform([0.5, 0.1, 0.06]), np.array([0.2, 0.2, 0.11]))
-    far = Box(RigidTransform([0.5, 0.1, 0.505]), np.array([5.0, 5.0, 1.0]))
-    a = fuse_depth_images([depth], [K], [X_WC], near, 0.004)
-    b = crop(fuse_depth_images([depth], [K], [X_WC], far, 0.004), near)
-    inner = Box(near.X_WB, near.size - 0.02)  # the rims of the regions differ
-    np.testing.assert_allclose(crop(a, inner).points, crop(b, inner).points, atol=1e-9)
 
 
 @settings(max_examples=25, deadline=None)
@@ -170,8 +112,6 @@ def test_wrong_input_is_refused() -> None:
         PointCloud(points, np.full((2, 3), np.nan))
     with pytest.raises(InputError, match="shape"):
         PointCloud(points, np.zeros((3, 3)))
-    with pytest.raises(InputError, match="per camera"):
-        fuse_depth_images([], [K], [], Box(RigidTransform(), np.ones(3)), 0.005)
     with pytest.raises(InputError, match="voxel_size"):
         downsample(PointCloud(points, np.tile([0.0, 0.0, 1.0], (2, 1))), 0.0)
 

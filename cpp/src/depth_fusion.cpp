@@ -325,16 +325,12 @@ class Fusion {
       const auto [columns, rows] = RegionOfInterest(views_[i], placements_[i]);
       if (columns.empty() || rows.empty()) continue;
       const int parts = options_.num_threads == 1 ? 1 : 2 * options_.num_threads;
-      // The normals' windows reach beyond what sees the box.
-      const int rim = 2 * (options_.window / 2);
-      const Range read{std::max(columns.begin - rim, 0),
-                       std::min(columns.end + rim, views_[i].width)};
       for (int part = 0; part < parts; ++part) {
         const auto cut = [&](int p) {
           return rows.begin + static_cast<int>(std::int64_t{rows.end - rows.begin} * p / parts);
         };
         const Range some{cut(part), cut(part + 1)};
-        if (!some.empty()) strips.push_back({static_cast<std::uint32_t>(i), read, some, {}});
+        if (!some.empty()) strips.push_back({static_cast<std::uint32_t>(i), columns, some, {}});
       }
     }
     return strips;

@@ -55,7 +55,7 @@ void Invert(const float* z, float low, float high, int begin, int end, float* w)
   }
 }
 
-bool Place(const float* w, const RayRow& rays, const Placement& at, int begin, int end,
+bool Place(float* w, const RayRow& rays, const Placement& at, int begin, int end,
            const PointRow& points) {
   Int found{};
   for (int u = RoundDown(begin); u < end; u += kLanes) {
@@ -75,6 +75,7 @@ bool Place(const float* w, const RayRow& rays, const Placement& at, int begin, i
       const Float cell = inside ? p * at.inverse_voxel : Fill(-1.0f);
       Store(__builtin_convertvector(cell, Int), points.voxel[k] + u);
     }
+    Store(inside ? Load(w + u) : Fill(kNaN), w + u);
     found |= inside;
   }
   return Any(found);

@@ -61,8 +61,9 @@ struct FitLimits {
 struct DepthKernel {
   /// w = 1/z, NaN where z is not within [low, high].
   void (*invert)(const float* z, float low, float high, int begin, int end, float* w);
-  /// Points and voxels of the measured pixels inside the box. Returns whether there is any.
-  bool (*place)(const float* w, const RayRow& rays, const Placement& placement, int begin, int end,
+  /// Points and voxels of the measured pixels inside the box; the w of others becomes NaN. Returns
+  /// whether there is any.
+  bool (*place)(float* w, const RayRow& rays, const Placement& placement, int begin, int end,
                 const PointRow& points);
   /// Fits the windows of (2 radius + 1)² pixels centred on the middle one of 2 radius + 1 rows.
   void (*fit)(const float* const* w, int radius, int begin, int end, const FitRow& fits);

@@ -165,15 +165,15 @@ void DepthRows::Read(int v, bool wanted) {
   }
   kernel_.invert(depth, static_cast<float>(options_.min_depth),
                  static_cast<float>(options_.max_depth), columns_.begin, columns_.end, w);
-  if (!wanted) return;
   Range range = columns_;
   if (placement_) {
+    // What lies outside the box is no neighbour either: slivers of the bin's walls get no normal.
     const PointRow points = points_at(v);
     if (!kernel_.place(w, rays_.Row(v), *placement_, range.begin, range.end, points)) return;
     while (points.voxel[0][range.begin] < 0) ++range.begin;
     while (points.voxel[0][range.end - 1] < 0) --range.end;
   }
-  RangeAt(v) = range;
+  if (wanted) RangeAt(v) = range;
 }
 
 void DepthRows::FitRowAt(int v) {

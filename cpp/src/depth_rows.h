@@ -81,7 +81,7 @@ struct SurfaceRow {
 /// Walks down the rows of a part of a view, and makes points and normals of each.
 class DepthRows {
  public:
-  /// @param roi columns and rows to be read, with a rim of twice the window's radius.
+  /// @param columns those to be read.
   /// @param placement null if only normals are wanted.
   /// @param R (3, 3) turns the normals.
   DepthRows(const DepthImageView& view, const DepthOptions& options, const DepthKernel& kernel,

@@ -73,10 +73,10 @@ struct FusedCloud {
 /// affine function of the pixel, so the plane of a window of pixels is a least-squares fit of three
 /// numbers. A pixel takes the plane of one of nine windows that hold it (centred on it, or with it
 /// on the rim): its own, unless another fits several times better, as happens near an edge
-/// (Kuwahara's choice). A pixel that no window fits, such as one between two surfaces, is left out.
-/// Normals point toward the camera. The points inside the box are then averaged in the voxels of
-/// the grid through W's origin. A voxel whose normals disagree (the two sides of a sheet) is left
-/// out.
+/// (Kuwahara's choice). What lies outside the box does not count. A pixel that no window fits, such
+/// as one between two surfaces, is left out. Normals point toward the camera. The points are then
+/// averaged in the voxels of the grid through W's origin. A voxel whose normals disagree (the two
+/// sides of a sheet) is left out.
 ///
 /// Arithmetic on pixels is in single precision, relative to the box; sums over voxels are in double
 /// precision. Voxels come in the order in which the views' pixels, row by row, first meet them. The

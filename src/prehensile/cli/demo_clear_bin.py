@@ -91,7 +91,7 @@ def _picture(run: ClearBinRun, attempt: Attempt, path: Path) -> None:
     pictures = [
         draw_grasp(
             run.station.GetOutputPort(f"{camera.name}.rgb_image").Eval(context).data,
-            camera.K,
+            camera.model.K,
             run.station.GetOutputPort(f"{camera.name}.X_WC").Eval(context),
             attempt.X_WG,
             attempt.width,

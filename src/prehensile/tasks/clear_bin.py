@@ -20,7 +20,7 @@ from prehensile.grasping import (
     ParallelGripper,
     select_grasps,
 )
-from prehensile.perception import PointCloud, convex_segments, fuse_depth_images
+from prehensile.perception import CameraModel, PointCloud, PosedCamera, convex_segments, fuse
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.obstacles import HeightMap
 from prehensile.planning.pick import (
@@ -66,10 +66,10 @@ class ClearBinConfig:
 
 @dc.dataclass(frozen=True)
 class Camera:
-    """A calibrated camera: the prefix of its ports and its intrinsic matrix K (3, 3)."""
+    """A calibrated camera: the prefix of its ports and its intrinsics."""
 
     name: str
-    K: np.ndarray
+    model: CameraModel
 
 
 @dc.dataclass(frozen=True)
@@ -274,10 +274,9 @@ class ClearBin:
 
     def _see(self, senses: Senses) -> PointCloud:
         """What the cameras see in the first bin, without its floor and walls."""
-        return fuse_depth_images(
+        return fuse(
             [senses.image(f"{c.name}.depth_image").data[:, :, 0] for c in self._cameras],
-            [c.K for c in self._cameras],
-            [senses.image(f"{c.name}.X_WC") for c in self._cameras],
+            [PosedCamera(c.model, senses.image(f"{c.name}.X_WC")) for c in self._cameras],
             self._pick_bin.region(inset=0.003, above_floor=0.005, above_rim=0.1),
             self.config.grasp.voxel_size,
         )

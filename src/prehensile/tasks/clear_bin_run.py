@@ -17,7 +17,7 @@ from pydrake.systems.sensors import CameraConfig, ImageDepth32F
 from prehensile.behavior.state_machine import StateMachine
 from prehensile.grasping import WSG50
 from prehensile.models.registry import list_models
-from prehensile.perception import Box
+from prehensile.perception import Box, CameraModel
 from prehensile.planning.arm import ArmModel
 from prehensile.scenes.clutter import (
     BIN_INTERIOR_MAX,
@@ -192,10 +192,10 @@ def choose_models(count: int, seed: int) -> list[str]:
     return chosen[:count]
 
 
-def intrinsics(config: CameraConfig) -> np.ndarray:
-    """The intrinsic matrix K (3, 3) of a camera's configuration, in pixels."""
+def intrinsics(config: CameraConfig) -> CameraModel:
+    """The intrinsics of the depth images of a camera's configuration."""
     _, depth_camera = config.MakeCameras()
-    return depth_camera.core().intrinsics().intrinsic_matrix()
+    return CameraModel.from_drake(depth_camera.core().intrinsics())
 
 
 def bin_geometry(world: RobotDiagram, name: str) -> BinGeometry:
