@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -100,17 +101,14 @@ nb::object Nodes(const DistanceField& field) {
 
 /// What came of one start, as (pose, cost, iterations on few points, on all, converged, finalist,
 /// information, sum of squares, sum of weights, residuals).
-nb::tuple Answer(RefinedPose&& pose) {
-  ArrayResult<> X{4, 4}, information{6, 6};
+nb::tuple Answer(const RefinedPose& pose) {
+  ArrayResult<> X{4, 4}, information{6, 6}, residuals{pose.residuals.size()};
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data()) = pose.X_WO.matrix();
   Eigen::Map<Eigen::Matrix<double, 6, 6>>(information.data()) = pose.information;
-  auto* const residuals = new std::vector<float>(std::move(pose.residuals));
-  const nb::capsule owner(residuals,
-                          [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
-  return nb::make_tuple(
-      X.Take(), pose.cost, pose.coarse_iterations, pose.iterations, pose.converged,
-      pose.is_finalist, information.Take(), pose.sum_squares, pose.sum_weights,
-      nb::ndarray<nb::numpy, float>(residuals->data(), {residuals->size()}, owner));
+  std::copy(pose.residuals.begin(), pose.residuals.end(), residuals.data());
+  return nb::make_tuple(X.Take(), pose.cost, pose.coarse_iterations, pose.iterations,
+                        pose.converged, pose.is_finalist, information.Take(), pose.sum_squares,
+                        pose.sum_weights, residuals.Take());
 }
 
 nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normals, nb::handle X_WO,
@@ -148,7 +146,7 @@ nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normal
                         num_threads);
   }
   nb::list answers;
-  for (RefinedPose& pose : poses) answers.append(Answer(std::move(pose)));
+  for (const RefinedPose& pose : poses) answers.append(Answer(pose));
   return answers;
 }
 

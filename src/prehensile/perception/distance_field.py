@@ -1,5 +1,6 @@
 """Distance fields of known objects: built once, kept on disk, looked up in nanoseconds."""
 
+import contextlib
 import hashlib
 import os
 import struct
@@ -241,15 +242,11 @@ def cached_distance_field(
     digest.update(np.ascontiguousarray(mesh.triangles, dtype="<i8").tobytes())
     path = _cache_folder(cache_dir) / f"{digest.hexdigest()[:32]}.field"
     if path.exists():
-        try:
+        with contextlib.suppress(InputError):  # A damaged one is replaced below.
             return DistanceField.load(path)
-        except InputError:
-            pass  # Damaged: replaced below.
     field = DistanceField.from_mesh(mesh, spacing, margin, signed=signed, num_threads=num_threads)
-    try:
+    with contextlib.suppress(OSError):  # A cache that cannot be written costs time only.
         field.save(path)
-    except OSError:
-        pass  # A cache that cannot be written costs time only.
     return field
 
 

@@ -9,6 +9,7 @@ from prehensile.perception.registration.consistency import (
 )
 from prehensile.perception.registration.constraints import HalfSpaces, fit_rigid_constrained
 from prehensile.perception.registration.convex_constraints import ConvexFit, fit_rigid_convex
+from prehensile.perception.registration.fpfh import fpfh, match_features
 from prehensile.perception.registration.gnc_rotation import (
     RotationEstimate,
     gnc_rotation,
@@ -27,9 +28,18 @@ from prehensile.perception.registration.known import (
     fit_rotation,
     fit_translation,
 )
+from prehensile.perception.registration.known_object import KnownObject
+from prehensile.perception.registration.locate import LocateConfig, LocateResult, locate
 from prehensile.perception.registration.losses import RobustLoss
+from prehensile.perception.registration.point_pairs import PointPairModel, PoseVotes
 from prehensile.perception.registration.ransac import (
     ransac_pose,
+)
+from prehensile.perception.registration.refine import (
+    RefineConfig,
+    RefinedPoses,
+    refine_pose,
+    refine_poses,
 )
 from prehensile.perception.registration.result import (
     RegistrationResult,
@@ -57,6 +67,13 @@ __all__ = [
     "IcpDirection",
     "IcpKind",
     "IcpModel",
+    "KnownObject",
+    "LocateConfig",
+    "LocateResult",
+    "PointPairModel",
+    "PoseVotes",
+    "RefineConfig",
+    "RefinedPoses",
     "RegistrationResult",
     "RegistrationStatus",
     "RigidFit",
@@ -70,13 +87,18 @@ __all__ = [
     "fit_rigid_convex",
     "fit_rotation",
     "fit_translation",
+    "fpfh",
     "gnc_rotation",
     "icp",
     "icp_many_starts",
+    "locate",
     "match_by_distances",
+    "match_features",
     "maximum_clique",
     "pose_uncertainty",
     "ransac_pose",
+    "refine_pose",
+    "refine_poses",
     "register_correspondences",
     "vote",
     "vote_for_scale",
