@@ -29,11 +29,33 @@ class Body:
         field: its distance field.
         points: (K, 3) samples of its surface, expressed in B [m]; some hundreds.
         normals: (K, 3) unit normals there, outward.
+        corners: (M, 3) of its convex hull, for what it must not enter [m]; by default those of
+            the samples.
     """
 
     field: DistanceField
     points: Array
     normals: Array
+    corners: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Checks the shapes.
+
+        Raises:
+            ValueError: naming the argument.
+        """
+        for name in ("points", "normals", "corners"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = np.ascontiguousarray(value, dtype=float)
+            if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
+                raise ValueError(f"{name}: expected (N, 3) finite numbers, not {array.shape}")
+            object.__setattr__(self, name, array)
+        if self.points.shape != self.normals.shape or not len(self.points):
+            raise ValueError(
+                "normals: expected one for each of the points, of which there are some"
+            )
 
 
 @dataclass(frozen=True)
@@ -89,6 +111,8 @@ class Evidence:
     Attributes:
         information: (L, 6, 6) of a motion [w; v] of each body about its own origin, in W.
         gradient: (L, 6) of half the weighed cost by that motion.
+        cost: robust squared distances and violations over the variance, whose half has that
+            gradient; on the scale of the loss that was asked for.
         residual: root mean square distance of the points that count [m]; NaN without any.
         num_points: effective number of points that count (the sum of their weights).
         seen: part of the samples facing a camera that were measured where they should be.
@@ -98,6 +122,7 @@ class Evidence:
 
     information: Array
     gradient: Array
+    cost: float
     residual: float
     num_points: float
     seen: float
@@ -165,12 +190,13 @@ class BodyEvidence:
             config.free_space_weight,
         )
         weight = 1 / (config.noise**2 * config.correlation)
-        _, num_points, squares = sums.sum(axis=0)
+        cost, num_points, squares = sums.sum(axis=0)
         facing, seen, in_free, occluded, _ = counts.sum(axis=0)
         facing = max(facing, 1.0)
         return Evidence(
             weight * information,
             weight * gradient,
+            weight * float(cost),
             float(np.sqrt(squares / num_points)) if num_points > 0 else np.nan,
             float(num_points),
             float(seen / facing),
