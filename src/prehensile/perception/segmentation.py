@@ -27,7 +27,7 @@ def convex_segments(
     piece next to them.
 
     Args:
-        cloud: one point per voxel, as :func:`prehensile.perception.fuse_depth_images` gives.
+        cloud: one point per voxel, as :func:`prehensile.perception.fuse` gives.
         voxel_size: edge of those voxels [m].
         max_concavity: two adjacent points are apart if their normals turn toward each other by
             more than this within a voxel's length [rad].
