@@ -150,17 +150,20 @@ def _python_for(contender: Contender, say: Callable[[str], None]) -> str:
     """Path of the Python that runs a contender; makes its environment if there is none."""
     if not contender.requirements:
         return sys.executable
-    folder = ROOT / "build" / "peers" / contender.name.lower().replace(" ", "-")
+    peers = ROOT / "build" / "peers"
+    wanted = "\n".join(contender.requirements)
+    for stamp in sorted(peers.glob("*/requirements.txt")):
+        if stamp.read_text() == wanted:  # Another contender's may have the same.
+            return str(stamp.parent / "bin" / "python")
+    folder = peers / contender.name.lower().replace(" ", "-")
     python = folder / "bin" / "python"
     stamp = folder / "requirements.txt"
-    wanted = "\n".join(contender.requirements)
-    if not stamp.exists() or stamp.read_text() != wanted:
-        say(f"installing {contender.name} into {folder.relative_to(ROOT)}")
-        base = Path(sys.base_prefix) / "bin" / "python3"
-        _call(base, "-m", "venv", "--clear", folder)
-        pip = (python, "-m", "pip", "install", "--disable-pip-version-check", "--quiet")
-        _call(*pip, *contender.requirements)
-        stamp.write_text(wanted)
+    say(f"installing {contender.name} into {folder.relative_to(ROOT)}")
+    base = Path(sys.base_prefix) / "bin" / "python3"
+    _call(base, "-m", "venv", "--clear", folder)
+    pip = (python, "-m", "pip", "install", "--disable-pip-version-check", "--quiet")
+    _call(*pip, *contender.requirements)
+    stamp.write_text(wanted)
     return str(python)
 
 
