@@ -22,14 +22,14 @@ void ConstructSums(GaussianSums* sums, nb::handle points) {
 }
 
 nb::object SumsAt(const GaussianSums& sums, nb::handle queries, double sigma, double floor,
-                  int num_threads) {
+                  double reach, int num_threads) {
   const ArrayArgument rows(queries, "queries");
   rows.RequireShape({-1, 3});
   ArrayResult<> result{rows.shape(0), 6};
   double* const out = result.data();
   {
     const nb::gil_scoped_release release;
-    sums.At(rows.data(), rows.shape(0), sigma, floor, out, num_threads);
+    sums.At(rows.data(), rows.shape(0), sigma, floor, reach, out, num_threads);
   }
   return result.Take();
 }
@@ -85,7 +85,7 @@ void BindPointDrift(nb::module_& m) {
   nb::class_<GaussianSums>(m, "GaussianSums")
       .def("__init__", &ConstructSums, "points"_a)
       .def("__len__", &GaussianSums::size)
-      .def("at", &SumsAt, "queries"_a, "sigma"_a, "floor"_a, "num_threads"_a);
+      .def("at", &SumsAt, "queries"_a, "sigma"_a, "floor"_a, "reach"_a, "num_threads"_a);
   m.def("spatial_order", &Order, "points"_a);
   m.def("coherent_point_drift", &Drift, "scene"_a, "model"_a, "X_WO_guess"_a, nb::kw_only(),
         "dimension"_a, "outlier_weight"_a, "outlier_volume"_a, "sigma"_a, "max_iterations"_a,

@@ -115,8 +115,8 @@ PointDriftResult CoherentPointDrift(const double* scene_rows, std::size_t num_sc
     local = R_OW * (scene.colwise() - p_WO);
     const double uniform = std::pow(2 * M_PI * variance, 0.5 * D) * w / (1 - w) *
                            static_cast<double>(num_model) / options.outlier_volume;
-    gaussians.At(local.data(), num_scene, std::sqrt(variance), uniform, sums.data(),
-                 options.num_threads);
+    gaussians.At(local.data(), num_scene, std::sqrt(variance), uniform, internal::kInfinity,
+                 sums.data(), options.num_threads);
 
     // Which part of each point the model explains, p, and the sum of its partners, weighted: p
     // times the point plus an offset e.

@@ -96,9 +96,10 @@ GaussianSums::GaussianSums(const double* points, std::size_t n)
 }
 
 void GaussianSums::At(const double* queries, std::size_t n, double sigma, double floor,
-                      double* sums, int num_threads) const {
+                      double reach, double* sums, int num_threads) const {
   Require(sigma > 0 && std::isfinite(sigma), "sigma: must be positive and finite");
   Require(floor >= 0, "floor: must be at least 0");
+  Require(reach > 0, "reach: must be positive");
   RequireFinite(queries, n, "queries: must be finite");
   static_assert(sizeof(DriftBlock) == 3 * kDriftLanes * sizeof(float));
   const auto* const blocks = reinterpret_cast<const DriftBlock*>(blocks_.data());
@@ -106,13 +107,14 @@ void GaussianSums::At(const double* queries, std::size_t n, double sigma, double
   const internal::DriftKernel& kernel = Kernel();
   const double width = 2 * (sigma / unit_) * (sigma / unit_);        // 2 sigma² in the sums' unit.
   const auto rate = static_cast<float>(1.4426950408889634 / width);  // log2(e) / (2 sigma²).
-  const auto reach = static_cast<float>(kCut * width);
-  const double least = static_cast<double>(size_) * std::exp(-kCut) / kLost;
+  const bool cut = reach < internal::kInfinity;
+  const auto squared_reach = static_cast<float>((cut ? 0.5 * reach * reach : kCut) * width);
+  const double least = cut ? 0.0 : static_cast<double>(size_) * std::exp(-kCut) / kLost;
 
   std::vector<std::int32_t> all(boxes_.size());
   std::iota(all.begin(), all.end(), 0);
   const std::size_t num_tiles = (n + kDriftLanes - 1) / kDriftLanes;
-  internal::RunShares(num_tiles, 4, num_threads, [&](std::size_t first, std::size_t last) {
+  internal::RunShares(num_tiles, 32, num_threads, [&](std::size_t first, std::size_t last) {
     std::vector<std::int32_t> near;
     for (std::size_t tile = first; tile < last; ++tile) {
       const std::size_t begin = tile * kDriftLanes, end = std::min(begin + kDriftLanes, n);
@@ -134,7 +136,7 @@ void GaussianSums::At(const double* queries, std::size_t n, double sigma, double
                                       box.lower[axis] - boxes_[b].upper[axis], 0.0f});
           squared += gap * gap;
         }
-        if (squared <= reach) near.push_back(b);
+        if (squared <= squared_reach) near.push_back(b);
       }
       for (std::size_t i = begin; i < end; ++i) {
         const float* const query = local[i - begin];

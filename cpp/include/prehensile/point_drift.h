@@ -27,10 +27,13 @@ class GaussianSums {
   /// @param queries n rows, finite.
   /// @param sigma positive.
   /// @param floor at least 0: what the sum of k is compared with.
+  /// @param reach points further than so many sigma are left out, and s is always 0; infinity:
+  /// every
+  ///     point counts that can matter.
   /// @param sums room for n rows of six.
   /// @throws std::invalid_argument as above.
-  void At(const double* queries, std::size_t n, double sigma, double floor, double* sums,
-          int num_threads) const;
+  void At(const double* queries, std::size_t n, double sigma, double floor, double reach,
+          double* sums, int num_threads) const;
 
  private:
   struct Box {

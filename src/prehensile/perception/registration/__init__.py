@@ -9,6 +9,7 @@ from prehensile.perception.registration.consistency import (
 )
 from prehensile.perception.registration.constraints import HalfSpaces, fit_rigid_constrained
 from prehensile.perception.registration.convex_constraints import ConvexFit, fit_rigid_convex
+from prehensile.perception.registration.filter_reg import FilterRegConfig, filter_registration
 from prehensile.perception.registration.fpfh import fpfh, match_features
 from prehensile.perception.registration.gnc_rotation import (
     RotationEstimate,
@@ -31,6 +32,14 @@ from prehensile.perception.registration.known import (
 from prehensile.perception.registration.known_object import KnownObject
 from prehensile.perception.registration.locate import LocateConfig, LocateResult, locate
 from prehensile.perception.registration.losses import RobustLoss
+from prehensile.perception.registration.planar import (
+    PlanarResult,
+    PlanarStep,
+    icp_2d,
+    planar_pose,
+    point_drift_2d,
+)
+from prehensile.perception.registration.point_drift import PointDriftConfig, coherent_point_drift
 from prehensile.perception.registration.point_pairs import PointPairModel, PoseVotes
 from prehensile.perception.registration.ransac import (
     ransac_pose,
@@ -62,6 +71,7 @@ __all__ = [
     "ConsistencyGraph",
     "ConvexFit",
     "CorrespondenceResult",
+    "FilterRegConfig",
     "HalfSpaces",
     "IcpConfig",
     "IcpDirection",
@@ -70,6 +80,9 @@ __all__ = [
     "KnownObject",
     "LocateConfig",
     "LocateResult",
+    "PlanarResult",
+    "PlanarStep",
+    "PointDriftConfig",
     "PointPairModel",
     "PoseVotes",
     "RefineConfig",
@@ -81,7 +94,9 @@ __all__ = [
     "RobustLoss",
     "RotationEstimate",
     "Vote",
+    "coherent_point_drift",
     "consistency_graph",
+    "filter_registration",
     "fit_rigid",
     "fit_rigid_constrained",
     "fit_rigid_convex",
@@ -90,11 +105,14 @@ __all__ = [
     "fpfh",
     "gnc_rotation",
     "icp",
+    "icp_2d",
     "icp_many_starts",
     "locate",
     "match_by_distances",
     "match_features",
     "maximum_clique",
+    "planar_pose",
+    "point_drift_2d",
     "pose_uncertainty",
     "ransac_pose",
     "refine_pose",
