@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from depth_scene import surface_samples
 from pydrake.geometry import (
     ClippingRange,
     DepthRange,
@@ -19,7 +20,6 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
-from depth_scene import surface_samples
 from prehensile.models.registry import find_model
 from prehensile.models.shapes.gltf import read_gltf
 from prehensile.perception.body_evidence import Body
@@ -57,9 +57,7 @@ class ArmScene:
         builder = DiagramBuilder()
         self.plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
         Parser(self.plant).AddModels(str(find_model("iiwa7").path))
-        self.plant.WeldFrames(
-            self.plant.world_frame(), self.plant.GetFrameByName("iiwa_link_0")
-        )
+        self.plant.WeldFrames(self.plant.world_frame(), self.plant.GetFrameByName("iiwa_link_0"))
         self.plant.Finalize()
         assert isinstance(scene_graph, SceneGraph)
         scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
