@@ -92,6 +92,35 @@ nb::tuple Closest(const DistanceField& field, nb::handle points) {
   return nb::make_tuple(at.Take(), normals.Take());
 }
 
+/// Poses (S, 4, 4).
+std::vector<Eigen::Isometry3d> Poses(nb::handle values, const char* name) {
+  const ArrayArgument X(values, name);
+  X.RequireShape({-1, 4, 4});
+  X.RequireFinite();
+  std::vector<Eigen::Isometry3d> poses(X.shape(0));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].matrix() =
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data() + 16 * i);
+  }
+  return poses;
+}
+
+nb::tuple NearestBody(const std::vector<const DistanceField*>& fields, nb::handle X_WL,
+                      nb::handle points, int num_threads) {
+  const std::vector<Eigen::Isometry3d> poses = Poses(X_WL, "X_WL");
+  const PointsArgument p(points, "points");
+  const std::size_t n = p.shape(0);
+  ArrayResult<> distances{n}, gradients{n, 3};
+  ArrayResult<std::int32_t> bodies{n};
+  double *const d = distances.data(), *const g = gradients.data();
+  std::int32_t* const b = bodies.data();
+  {
+    const nb::gil_scoped_release release;
+    NearestBodyAtRows(fields, poses, p.data(), n, num_threads, d, g, b);
+  }
+  return nb::make_tuple(distances.Take(), gradients.Take(), bodies.Take());
+}
+
 nb::object Nodes(const DistanceField& field) {
   const std::vector<FieldNode>& nodes = field.nodes();
   nb::object owner = nb::find(field);
@@ -119,14 +148,7 @@ nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normal
   const PointsArgument p(points, "points");
   std::optional<PointsArgument> n;
   if (!normals.is_none()) n.emplace(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
-  const ArrayArgument X(X_WO, "X_WO");
-  X.RequireShape({-1, 4, 4});
-  X.RequireFinite();
-  std::vector<Eigen::Isometry3d> starts(X.shape(0));
-  for (std::size_t i = 0; i < starts.size(); ++i) {
-    starts[i].matrix() =
-        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(X.data() + 16 * i);
-  }
+  const std::vector<Eigen::Isometry3d> starts = Poses(X_WO, "X_WO");
   const RefineOptions options{.loss = ParseRobustLoss(loss),
                               .scale = scale,
                               .initial_scale = initial_scale,
@@ -166,6 +188,7 @@ void BindDistanceField(nb::module_& m) {
       .def_prop_ro("nodes", &Nodes)
       .def("at", &At, "points"_a, "num_threads"_a)
       .def("closest", &Closest, "points"_a);
+  m.def("nearest_body", &NearestBody, "fields"_a, "X_WL"_a, "points"_a, "num_threads"_a);
   m.attr("MOST_FIELD_NODES") = kMostFieldNodes;
   m.def("refine_poses", &Refine, "field"_a, "points"_a, "normals"_a.none(), "X_WO"_a, "loss"_a,
         "scale"_a, "initial_scale"_a, "cooling"_a, "max_distance"_a, "kept_fraction"_a,

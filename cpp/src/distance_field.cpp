@@ -84,4 +84,31 @@ void DistanceField::AtRows(const double* p_O, std::size_t n, int num_threads, do
   });
 }
 
+void NearestBodyAtRows(const std::vector<const DistanceField*>& fields,
+                       const std::vector<Eigen::Isometry3d>& X_WL, const double* p_W, std::size_t n,
+                       int num_threads, double* distances, double* gradients,
+                       std::int32_t* bodies) {
+  internal::Require(!fields.empty(), "fields: none");
+  internal::Require(fields.size() == X_WL.size(), "X_WL: not as many as fields");
+  std::vector<Eigen::Isometry3d> X_LW;
+  for (const Eigen::Isometry3d& X : X_WL) X_LW.push_back(X.inverse());
+  internal::RunShares(n, kRowsPerThread, num_threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3d>(p_W + 3 * i);
+      DistanceField::Value nearest{internal::kInfinity, Eigen::Vector3d::Zero()};
+      std::size_t body = 0;
+      for (std::size_t k = 0; k < fields.size(); ++k) {
+        const DistanceField::Value value = fields[k]->At(X_LW[k] * p);
+        if (value.distance < nearest.distance) {
+          nearest = value;
+          body = k;
+        }
+      }
+      distances[i] = nearest.distance;
+      bodies[i] = static_cast<std::int32_t>(body);
+      Eigen::Map<Eigen::Vector3d>(gradients + 3 * i) = X_WL[body].linear() * nearest.gradient;
+    }
+  });
+}
+
 }  // namespace prehensile

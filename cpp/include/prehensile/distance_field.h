@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -139,5 +140,18 @@ DistanceField MeshDistanceField(const double* vertices, std::size_t num_vertices
 /// @throws std::invalid_argument naming the argument.
 DistanceField CloudDistanceField(const double* points, const double* normals, std::size_t n,
                                  double radius, const FieldGrid& grid, int num_threads);
+
+/// The distance to bodies that move, each with a field: the least over the bodies, which body it
+/// is, and the gradient, for n points in W.
+///
+/// @param fields of the bodies, each in the body's frame L; at least one, and fewer than 2³¹.
+/// @param X_WL as many.
+/// @param p_W n rows of x, y, z.
+/// @param distances, bodies room for n; of bodies alike the first counts.
+/// @param gradients room for n rows, expressed in W.
+/// @throws std::invalid_argument naming the argument.
+void NearestBodyAtRows(const std::vector<const DistanceField*>& fields,
+                       const std::vector<Eigen::Isometry3d>& X_WL, const double* p_W, std::size_t n,
+                       int num_threads, double* distances, double* gradients, std::int32_t* bodies);
 
 }  // namespace prehensile

@@ -730,3 +730,15 @@ def coherent_point_drift(
     keep_history: bool,
     num_threads: int,
 ) -> dict[str, Any]: ...
+
+# Branch and bound over poses (prehensile/branch_and_bound.h).
+def branch_and_bound(
+    scene_points: ArrayLike,
+    model_points: ArrayLike,
+    max_distance: float,
+    max_gap: float,
+    planar: bool,
+    max_nodes: int,
+    time_limit: float,
+) -> tuple[NDArray[np.float64], float, float, bool, int]:
+    """X_OW, cost, lower bound, whether the gap was reached, nodes."""

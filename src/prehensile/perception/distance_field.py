@@ -124,6 +124,39 @@ class DistanceField:
         core = _core.DistanceField.from_cloud(cloud.points, normals, radius, *grid, num_threads)
         return DistanceField(core)
 
+    @staticmethod
+    def from_values(
+        origin: ArrayLike,
+        spacing: float,
+        distances: ArrayLike,
+        gradients: ArrayLike,
+        *,
+        signed: bool = True,
+    ) -> "DistanceField":
+        """The field of distances known at the nodes, of a closed form or another's field.
+
+        Args:
+            origin: (3,) node (0, 0, 0), in O [m].
+            spacing: of the nodes [m].
+            distances: (nx, ny, nz) [m], each size at least 2.
+            gradients: (nx, ny, nz, 3) of the distances, no longer than 1.
+            signed: whether distances are negative inside.
+
+        Raises:
+            ValueError: naming the argument.
+        """
+        x, y, z = np.asarray(origin, dtype=float)
+        d, g = np.asarray(distances, dtype=np.float32), np.asarray(gradients, dtype=np.float32)
+        if d.ndim != 3 or g.shape != (*d.shape, 3):
+            raise ValueError(
+                f"distances: expected (nx, ny, nz) and gradients (nx, ny, nz, 3), not {d.shape} "
+                f"and {g.shape}"
+            )
+        nodes = np.concatenate([d[..., None], g], axis=-1).reshape(-1, 4)
+        return DistanceField(
+            _core.DistanceField((float(x), float(y), float(z)), spacing, d.shape, nodes, signed)
+        )
+
     @property
     def is_signed(self) -> bool:
         """Whether the distance is negative inside; if not, it is never negative."""
