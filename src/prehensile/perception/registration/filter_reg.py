@@ -19,7 +19,6 @@ from prehensile.perception.registration.point_drift import bounding_volume
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
-
 # Gaussians are cut off beyond so many sigma.
 _REACH = 3.0
 
