@@ -36,10 +36,12 @@ double ClosestOnSegment(const Vector3d& a, const Vector3d& ab, const Vector3d& q
   return squared > 0 ? internal::Clamped(ab.dot(query - a) / squared, 0, 1) : 0;
 }
 
-/// Solid angle of a triangle seen from the origin (van Oosterom and Strackee, 1983).
+/// Solid angle of a triangle seen from the origin (van Oosterom and Strackee, 1983); 0 from its
+/// plane, and so also from within it, where it is the mean of both sides.
 double SolidAngle(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   const double y = a.dot(b.cross(c));
+  if (y == 0) return 0;
   const double x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
   return 2 * std::atan2(y, x);
 }
