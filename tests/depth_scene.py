@@ -87,8 +87,8 @@ def render_depth(
         z = np.where(hit, z, np.inf).reshape(part.shape[:2])
         depth[v0:v1, u0:u1] = np.minimum(depth[v0:v1, u0:u1], z)
     if rng is not None:
-        depth += rng.normal(0, noise, depth.shape) * depth**2
-        depth[rng.uniform(size=depth.shape) < 0.02] = 0
+        depth += noise * rng.standard_normal(depth.shape, dtype=np.float32) * depth**2
+        depth[rng.random(depth.shape, dtype=np.float32) < 0.02] = 0
     return depth.astype(np.float32)
 
 
