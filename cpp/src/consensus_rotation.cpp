@@ -46,7 +46,7 @@ Vote VoteForScalar(const double* values, const double* bounds, std::size_t n, bo
     w += sign * weight;
     wx += sign * weight * x;
     wxx += sign * weight * x * x;
-    if (ends[e].closes) continue;  // Fewer than just before, among the same values.
+    if (count == 0) continue;
     const double cost =
         std::max(0.0, wxx - wx * wx / w) + outlier_cost * static_cast<double>(n - count);
     if (cost < best) {

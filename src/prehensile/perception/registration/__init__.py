@@ -1,5 +1,9 @@
 """Poses of known objects in clouds: every method answers with a :class:`RegistrationResult`."""
 
+from prehensile.perception.registration.branch_and_bound import (
+    BranchAndBoundResult,
+    branch_and_bound,
+)
 from prehensile.perception.registration.consistency import (
     Clique,
     ConsistencyGraph,
@@ -67,6 +71,7 @@ from prehensile.perception.registration.voting import (
 )
 
 __all__ = [
+    "BranchAndBoundResult",
     "Clique",
     "ConsistencyGraph",
     "ConvexFit",
@@ -94,6 +99,7 @@ __all__ = [
     "RobustLoss",
     "RotationEstimate",
     "Vote",
+    "branch_and_bound",
     "coherent_point_drift",
     "consistency_graph",
     "filter_registration",
