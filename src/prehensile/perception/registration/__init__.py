@@ -36,6 +36,7 @@ from prehensile.perception.registration.known import (
 from prehensile.perception.registration.known_object import KnownObject
 from prehensile.perception.registration.locate import LocateConfig, LocateResult, locate
 from prehensile.perception.registration.losses import RobustLoss
+from prehensile.perception.registration.nonlinear import estimate_pose_nonlinear
 from prehensile.perception.registration.planar import (
     PlanarResult,
     PlanarStep,
@@ -102,6 +103,7 @@ __all__ = [
     "branch_and_bound",
     "coherent_point_drift",
     "consistency_graph",
+    "estimate_pose_nonlinear",
     "filter_registration",
     "fit_rigid",
     "fit_rigid_constrained",
