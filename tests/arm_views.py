@@ -3,7 +3,6 @@
 from functools import cache
 
 import numpy as np
-from depth_scene import surface_samples
 from pydrake.geometry import (
     ClippingRange,
     DepthRange,
@@ -21,21 +20,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo
 
 from prehensile.models.registry import find_model
-from prehensile.models.shapes.gltf import read_gltf
 from prehensile.perception.body_evidence import Body
 from prehensile.perception.camera_model import PosedCamera
 from prehensile.perception.distance_field import DistanceField
-from prehensile.perception.mesh import TriangleMesh
-
-
-def gltf_mesh(path) -> TriangleMesh:
-    """All parts of one of our glTF files as one mesh."""
-    parts = [part.mesh for part in read_gltf(path)]
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in parts)])
-    return TriangleMesh(
-        np.concatenate([mesh.vertices for mesh in parts]),
-        np.concatenate([m.faces + start for m, start in zip(parts, starts, strict=False)]),
-    )
+from prehensile.perception.mesh_file import read_mesh
 
 
 @cache
@@ -44,9 +32,9 @@ def links(first: int = 0) -> tuple[Body, ...]:
     folder = find_model("iiwa7").path.parent
     bodies = []
     for k in range(first, 8):
-        mesh = gltf_mesh(folder / f"link_{k}.gltf")
-        field = DistanceField.from_mesh(mesh, spacing=0.005, margin=0.06, signed=False)
-        bodies.append(Body(field, *surface_samples(mesh, field, 150)))
+        mesh = read_mesh(folder / f"link_{k}.gltf")
+        field = DistanceField.from_mesh(mesh, spacing=0.01, margin=0.05, signed=False)
+        bodies.append(Body.from_mesh(mesh, field, num_samples=150))
     return tuple(bodies)
 
 

@@ -31,22 +31,6 @@ def boxes_mesh(boxes: Sequence[tuple[Sequence[float], Sequence[float]]]) -> Tria
     )
 
 
-def surface_samples(
-    mesh: TriangleMesh, field: DistanceField, count: int, seed: int = 0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Points (count, 3) evenly spread over the outer surface, and their normals."""
-    rng = np.random.default_rng(seed)
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    area = np.cross(b - a, c - a)
-    size = np.linalg.norm(area, axis=1)
-    chosen = rng.choice(len(a), 3 * count, p=size / size.sum())
-    u, v = rng.uniform(size=(2, 3 * count, 1))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    points = a[chosen] + u * (b - a)[chosen] + v * (c - a)[chosen]
-    outer = np.abs(field.at(points).distances) < 1e-3
-    return points[outer][:count], (area / size[:, None])[chosen][outer][:count]
-
-
 def render_depth(
     camera: PosedCamera,
     bodies: Sequence[tuple[DistanceField, RigidTransform]],

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from depth_scene import boxes_mesh, d415, look_at, render_depth, surface_samples
+from depth_scene import boxes_mesh, d415, look_at, render_depth
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.native import _core
@@ -21,7 +21,7 @@ TABLE = HalfSpaces([[0, 0, 1]], [0])
 def hammer() -> Body:
     mesh = boxes_mesh([((0, 0, 0), (0.16, 0.03, 0.025)), ((0.07, 0.01, 0), (0.04, 0.09, 0.04))])
     field = DistanceField.from_mesh(mesh, spacing=0.003, margin=0.035)
-    return Body(field, *surface_samples(mesh, field, 400), mesh.vertices)
+    return Body.from_mesh(mesh, field)
 
 
 def error(X_WO: RigidTransform | None, truth: RigidTransform) -> tuple[float, float]:
@@ -125,13 +125,13 @@ def test_free_space_holds_what_the_points_leave_free():
     """Points of the middle of a plate leave it free to slide; rays past its edges do not."""
     mesh = boxes_mesh([((0, 0, 0), (0.15, 0.1, 0.02))])
     field = DistanceField.from_mesh(mesh, spacing=0.004, margin=0.04)
-    plate = Body(field, *surface_samples(mesh, field, 600))
+    plate = Body.from_mesh(mesh, field)
     truth = RigidTransform([0, 0, 0.01])
     camera = d415(look_at((0.02, -0.05, 0.8), (0, 0, 0)))
     view = DepthView(render_depth(camera, [(field, truth)], background=1.2), camera)
     grid = np.stack(np.meshgrid(np.linspace(-0.04, 0.04, 20), np.linspace(-0.03, 0.03, 20)), -1)
     points = np.c_[grid.reshape(-1, 2), np.full(400, 0.02)]
-    guess = RigidTransform(RotationMatrix.MakeZRotation(0.1), [0.02, -0.008, 0.01])
+    guess = RigidTransform(RotationMatrix.MakeZRotation(0.15), [0.02, -0.008, 0.01])
     free = refine_constrained(points, plate, guess)
     assert free.status is RegistrationStatus.DEGENERATE
     assert free.free_directions is not None
@@ -139,7 +139,7 @@ def test_free_space_holds_what_the_points_leave_free():
     assert error(free.X_WO, truth)[0] > 0.02
     held = refine_constrained(points, plate, guess, views=view)
     assert error(held.X_WO, truth)[0] < 0.006
-    assert error(held.X_WO, truth)[1] < 0.05
+    assert error(held.X_WO, truth)[1] < 0.1
 
 
 def test_impossible_half_spaces_and_empty_scenes_are_told(hammer):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from depth_scene import boxes_mesh, d415, look_at, render_depth, surface_samples
+from depth_scene import boxes_mesh, d415, look_at, render_depth
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
@@ -30,7 +30,7 @@ NOISE = 0.002  # At 1 m, growing with the square of the depth.
 def hammer() -> Body:
     mesh = boxes_mesh([((0, 0, 0), (0.16, 0.03, 0.025)), ((0.07, 0.01, 0), (0.04, 0.09, 0.04))])
     field = DistanceField.from_mesh(mesh, spacing=0.003, margin=0.035)
-    return Body(field, *surface_samples(mesh, field, 400))
+    return Body.from_mesh(mesh, field)
 
 
 @pytest.fixture(scope="module")

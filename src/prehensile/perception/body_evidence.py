@@ -16,6 +16,8 @@ from pydrake.math import RigidTransform
 from prehensile.native import _core
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.free_space import DepthView
+from prehensile.perception.mesh import TriangleMesh
+from prehensile.perception.registration.constraints import corner_points
 from prehensile.perception.registration.losses import RobustLoss
 
 Array = NDArray[np.float64]
@@ -56,6 +58,49 @@ class Body:
             raise ValueError(
                 "normals: expected one for each of the points, of which there are some"
             )
+
+    @staticmethod
+    def from_mesh(
+        mesh: TriangleMesh,
+        field: DistanceField | None = None,
+        *,
+        num_samples: int = 400,
+        seed: int = 0,
+    ) -> "Body":
+        """A body from its mesh.
+
+        Args:
+            mesh: its surface; parts of it that lie inside it get no samples if the field is signed.
+            field: its distance field; built from the mesh if None.
+            num_samples: samples spread evenly over the surface, >= 1.
+            seed: of where they lie.
+
+        Raises:
+            ValueError: as :meth:`.DistanceField.from_mesh`, or if there are to be no samples.
+        """
+        if num_samples < 1:
+            raise ValueError(f"num_samples: must be at least 1, not {num_samples}")
+        field = field or DistanceField.from_mesh(mesh)
+        rng = np.random.default_rng(seed)
+        # Many candidates, of which those on the outer surface are thinned out evenly: each time
+        # the one farthest from all before.
+        areas = mesh.areas()
+        chosen = rng.choice(len(areas), 8 * num_samples, p=areas / areas.sum())
+        u, v = rng.uniform(size=(2, len(chosen), 1))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        a, b, c = (mesh.vertices[mesh.triangles[chosen, k]] for k in range(3))
+        candidates = a + u * (b - a) + v * (c - a)
+        outer = np.abs(field.at(candidates).distances) < max(0.5 * field.spacing, 1e-3)
+        candidates = candidates[outer]
+        normals = mesh.triangle_normals()[chosen][outer]
+        distances = np.full(len(candidates), np.inf)
+        kept = [0]
+        while len(kept) < min(num_samples, len(candidates)):
+            away = ((candidates - candidates[kept[-1]]) ** 2).sum(axis=1)
+            distances = np.minimum(distances, away)
+            kept.append(int(distances.argmax()))
+        corners = corner_points(None, mesh.vertices)
+        return Body(field, candidates[kept], normals[kept], corners)
 
 
 @dataclass(frozen=True)
