@@ -26,18 +26,40 @@ using internal::SurfaceRow;
 
 /// Voxels along an axis of the grid: 21 bits of a key.
 constexpr double kMaxVoxels = 1 << 21;
-/// Length of the sum of a voxel's unit normals, per normal, below which they point nowhere.
+/// Length of the sum of a voxel's unit normals, per normal, below which they
+/// point nowhere.
 constexpr double kLeastAgreement = 0.25;
 
 /// Neighbouring pixels of a row that lie in the same voxel.
 struct Run {
   std::uint64_t key;
-  std::uint32_t camera;
   std::uint32_t count;
+  /// Number of the runs before it.
+  std::uint32_t rank;
   float sum[3];
   float normal[3];
-  std::uint32_t color[3];
 };
+using ColorSum = std::array<std::uint32_t, 3>;
+
+/// Runs of one share of the voxels that one camera saw, in order; their
+/// colours, if any is known.
+struct Runs {
+  std::vector<Run> runs;
+  std::vector<ColorSum> colors;
+};
+
+std::uint64_t Hash(std::uint64_t key) {
+  key ^= key >> 32;
+  key *= 0x9E3779B97F4A7C15u;
+  return key;
+}
+
+/// The voxels are shared out by their hash h, a fraction of 2⁶⁴: the integer
+/// part of h · num_shares says to whom a voxel belongs, and the fraction that
+/// is left is its hash within that share.
+std::uint64_t ShareOf(std::uint64_t key, std::uint64_t num_shares) {
+  return static_cast<std::uint64_t>(static_cast<unsigned __int128>(Hash(key)) * num_shares >> 64);
+}
 
 /// What is known of one voxel: one cache line.
 struct alignas(64) Record {
@@ -45,45 +67,44 @@ struct alignas(64) Record {
   double sum[3];
   float normal[3];
   std::uint32_t count;
-  /// The camera that is adding now and the number of its points, and the best one before it.
+  /// The camera that is adding now and the number of its points, and the best
+  /// one before it.
   std::uint16_t camera, best_camera;
   std::uint32_t camera_count, best_count;
-  /// Number of the run that made it.
+  /// Rank of the run that made it.
   std::uint32_t first;
 };
 
-/// One share of the voxels, an open-addressing hash table. To whom a voxel belongs is decided by
-/// its key alone.
+/// One share of the voxels, an open-addressing hash table.
 class VoxelShare {
  public:
-  VoxelShare(std::uint64_t share, std::uint64_t num_shares, bool colored)
-      : share_(share), num_shares_(num_shares), colored_(colored) {
-    Grow(1 << 14);
+  /// @param expected about how many voxels there will be; more find room, too.
+  VoxelShare(std::uint64_t num_shares, std::size_t expected, bool colored)
+      : num_shares_(num_shares), colored_(colored) {
+    Grow(std::bit_ceil(std::max(expected, std::size_t{1} << 12)));
   }
 
-  /// Adds those of the runs that belong to this share.
-  void Add(std::span<const Run> runs, std::size_t first) {
+  /// Adds runs of this share. `offset` is added to their ranks.
+  void Add(const Runs& some, std::uint16_t camera, std::uint32_t offset) {
     constexpr std::size_t kBlock = 64;
-    std::uint32_t mine[kBlock];
+    const std::vector<Run>& runs = some.runs;
     std::uint64_t bucket[kBlock];
     for (std::size_t begin = 0; begin < runs.size(); begin += kBlock) {
-      const std::size_t end = std::min(runs.size(), begin + kBlock);
-      if (records_.size() + kBlock > capacity_) Grow(2 * capacity_);
+      const std::size_t count = std::min(runs.size() - begin, kBlock);
+      if (records_.size() + kBlock > capacity_) Grow(4 * capacity_);
       // Ask for the buckets and the records in them ahead of use.
-      std::size_t count = 0;
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto product = static_cast<unsigned __int128>(Hash(runs[i].key)) * num_shares_;
-        mine[count] = static_cast<std::uint32_t>(i);
-        bucket[count] = static_cast<std::uint64_t>(product) >> shift_;
-        __builtin_prefetch(&buckets_[bucket[count]]);
-        count += static_cast<std::uint64_t>(product >> 64) == share_;
+      for (std::size_t i = 0; i < count; ++i) {
+        bucket[i] = (Hash(runs[begin + i].key) * num_shares_) >> shift_;
+        __builtin_prefetch(&buckets_[bucket[i]]);
       }
       for (std::size_t i = 0; i < count; ++i) {
         const std::uint32_t at = buckets_[bucket[i]];
         if (at != kEmpty) __builtin_prefetch(&records_[at], 1);
       }
       for (std::size_t i = 0; i < count; ++i) {
-        AddOne(runs[mine[i]], bucket[i], static_cast<std::uint32_t>(first + mine[i]));
+        const std::uint32_t at = AddOne(runs[begin + i], bucket[i], camera, offset);
+        if (!colored_) continue;
+        for (int k = 0; k < 3; ++k) colors_[at][k] += some.colors[begin + i][k];
       }
     }
   }
@@ -94,42 +115,35 @@ class VoxelShare {
  private:
   static constexpr std::uint32_t kEmpty = ~std::uint32_t{0};
 
-  static std::uint64_t Hash(std::uint64_t key) {
-    key ^= key >> 32;
-    key *= 0x9E3779B97F4A7C15u;
-    return key;
-  }
-
-  void AddOne(const Run& run, std::uint64_t bucket, std::uint32_t first) {
+  /// Returns the number of the record.
+  std::uint32_t AddOne(const Run& run, std::uint64_t bucket, std::uint16_t camera,
+                       std::uint32_t offset) {
     while (buckets_[bucket] != kEmpty && records_[buckets_[bucket]].key != run.key) {
       bucket = (bucket + 1) & (buckets_.size() - 1);
     }
-    std::uint32_t& at = buckets_[bucket];
-    if (at == kEmpty) {
-      at = static_cast<std::uint32_t>(records_.size());
-      const auto camera = static_cast<std::uint16_t>(run.camera);
-      records_.push_back({.key = run.key, .camera = camera, .best_camera = camera, .first = first});
+    if (buckets_[bucket] == kEmpty) {
+      buckets_[bucket] = static_cast<std::uint32_t>(records_.size());
+      records_.push_back(
+          {.key = run.key, .camera = camera, .best_camera = camera, .first = offset + run.rank});
       if (colored_) colors_.push_back({});
     }
+    const std::uint32_t at = buckets_[bucket];
     Record& record = records_[at];
     for (int k = 0; k < 3; ++k) record.sum[k] += run.sum[k];
     for (int k = 0; k < 3; ++k) record.normal[k] += run.normal[k];
     record.count += run.count;
-    if (record.camera != run.camera) {  // Cameras come one after the other.
-      record.camera = static_cast<std::uint16_t>(run.camera);
-      record.camera_count = 0;
-    }
-    record.camera_count += run.count;
+    // Cameras come one after the other.
+    record.camera_count = record.camera == camera ? record.camera_count + run.count : run.count;
+    record.camera = camera;
     if (record.camera_count > record.best_count) {
       record.best_count = record.camera_count;
-      record.best_camera = record.camera;
+      record.best_camera = camera;
     }
-    if (colored_) {
-      for (int k = 0; k < 3; ++k) colors_[at][k] += run.color[k];
-    }
+    return at;
   }
 
-  /// Makes room for `capacity` records, a power of two, and twice as many buckets.
+  /// Makes room for `capacity` records, a power of two, and twice as many
+  /// buckets.
   void Grow(std::size_t capacity) {
     capacity_ = capacity;
     records_.reserve(capacity);
@@ -142,7 +156,6 @@ class VoxelShare {
     }
   }
 
-  std::uint64_t share_;
   std::uint64_t num_shares_;
   bool colored_;
   std::size_t capacity_ = 0;
@@ -152,7 +165,8 @@ class VoxelShare {
   std::vector<std::uint32_t> buckets_;
 };
 
-/// The grid that voxels are numbered in: axes of W, origin on a corner of a voxel of W.
+/// The grid that voxels are numbered in: axes of W, origin on a corner of a
+/// voxel of W.
 struct Grid {
   Eigen::Vector3d origin;
   double voxel_size;
@@ -192,8 +206,8 @@ Placement MakePlacement(const DepthImageView& view, const Eigen::Matrix4d& X_WB,
   return at;
 }
 
-/// Columns and rows that can see the box; all if the box reaches near the camera's plane or if the
-/// lens distorts.
+/// Columns and rows that can see the box; all if the box reaches near the
+/// camera's plane or if the lens distorts.
 std::pair<Range, Range> RegionOfInterest(const DepthImageView& view, const Placement& at) {
   Range columns{0, view.width}, rows{0, view.height};
   if (view.rays) return {columns, rows};
@@ -225,38 +239,48 @@ std::uint64_t Key(std::int32_t x, std::int32_t y, std::int32_t z) {
          std::uint64_t(std::uint32_t(z));
 }
 
-/// Appends the runs of a row of pixels.
+/// A part of a view, and the runs that it gave to each share of the voxels.
+struct Strip {
+  std::uint16_t camera;
+  Range columns;
+  Range rows;
+  std::vector<Runs> shares;
+  std::uint32_t num_runs = 0;
+};
+
+/// Adds the runs of a row of pixels to a strip.
 template <bool kColored>
-void AppendRuns(const SurfaceRow& row, std::uint32_t camera, const std::uint8_t* colors,
-                std::vector<Run>* runs) {
+void AppendRuns(const SurfaceRow& row, const std::uint8_t* colors, Strip* strip) {
   const float* const* const n = row.normals;
   const internal::PointRow& at = row.points;
+  const std::size_t num_shares = strip->shares.size();
   std::int32_t x = -1, y = -1, z = -1;
   Run run{};
+  ColorSum color{};
+  const auto finish = [&] {
+    if (!run.count) return;
+    run.rank = strip->num_runs++;
+    Runs& to = strip->shares[num_shares == 1 ? 0 : ShareOf(run.key, num_shares)];
+    to.runs.push_back(run);
+    if constexpr (kColored) to.colors.push_back(color);
+  };
   for (int u = row.columns.begin; u < row.columns.end; ++u) {
     if (at.voxel[0][u] < 0 || !(n[0][u] == n[0][u])) continue;
     if (((at.voxel[0][u] ^ x) | (at.voxel[1][u] ^ y) | (at.voxel[2][u] ^ z)) != 0) {
-      if (run.count) runs->push_back(run);
+      finish();
       x = at.voxel[0][u], y = at.voxel[1][u], z = at.voxel[2][u];
-      run = Run{.key = Key(x, y, z), .camera = camera};
+      run = Run{.key = Key(x, y, z)};
+      color = {};
     }
     ++run.count;
     for (int k = 0; k < 3; ++k) run.sum[k] += at.p[k][u];
     for (int k = 0; k < 3; ++k) run.normal[k] += n[k][u];
     if constexpr (kColored) {
-      for (int k = 0; k < 3; ++k) run.color[k] += colors[3 * u + k];
+      for (int k = 0; k < 3; ++k) color[k] += colors[3 * u + k];
     }
   }
-  if (run.count) runs->push_back(run);
+  finish();
 }
-
-/// A part of a view, and the runs that it gave.
-struct Strip {
-  std::uint32_t camera;
-  Range columns;
-  Range rows;
-  std::vector<Run> runs;
-};
 
 class Fusion {
  public:
@@ -273,67 +297,96 @@ class Fusion {
   }
 
   FusedCloud Run() {
-    const int num_threads = options_.num_threads;
     std::vector<Strip> strips = MakeStrips();
+    const int num_shares = strips.empty() ? 1 : static_cast<int>(strips[0].shares.size());
     std::vector<VoxelShare> shares;
-    const auto walk = [&](Strip& strip, const auto& after_row) {
-      const DepthImageView& view = views_[strip.camera];
-      DepthRows rows(view, options_, kernel_, strip.columns, &placements_[strip.camera],
-                     view.X_WC.topLeftCorner<3, 3>());
-      rows.Walk(strip.rows, [&](const SurfaceRow& row) {
-        if (colored_) {
-          const std::size_t at = std::size_t{3} * view.width * row.v;
-          AppendRuns<true>(row, strip.camera, view.colors + at, &strip.runs);
-        } else {
-          AppendRuns<false>(row, strip.camera, nullptr, &strip.runs);
-        }
-        after_row();
-      });
-    };
-    std::size_t num_runs = 0;
-    if (num_threads == 1) {
-      shares.emplace_back(0, 1, colored_);
+    if (num_shares == 1) {
+      // Row by row, so that runs stay in the cache.
+      shares.emplace_back(1, std::size_t{1} << 15, colored_);
+      std::uint32_t num_runs = 0;
       for (Strip& strip : strips) {
-        walk(strip, [&] {
-          shares[0].Add(strip.runs, num_runs);
-          num_runs += strip.runs.size();
-          strip.runs.clear();
+        strip.num_runs = num_runs;
+        Walk(&strip, [&] {
+          shares[0].Add(strip.shares[0], strip.camera, 0);
+          strip.shares[0].runs.clear();
+          strip.shares[0].colors.clear();
         });
+        num_runs = strip.num_runs;
       }
       return Write(shares, num_runs);
     }
-    internal::RunParallel(num_threads, [&](int thread) {
-      for (std::size_t i = thread; i < strips.size(); i += num_threads) walk(strips[i], [] {});
+    internal::RunParallel(num_shares, [&](int thread) {
+      for (std::size_t i = thread; i < strips.size(); i += num_shares) Walk(&strips[i], [] {});
     });
-    for (int i = 0; i < num_threads; ++i) shares.emplace_back(i, num_threads, colored_);
-    internal::RunParallel(num_threads, [&](int thread) {
-      std::size_t first = 0;
+    // Each share is added up in the order of the strips, so that sums do not
+    // depend on threads.
+    std::uint32_t num_runs = 0;
+    for (const Strip& strip : strips) num_runs += strip.num_runs;
+    for (int i = 0; i < num_shares; ++i) {
+      shares.emplace_back(num_shares, num_runs / num_shares / 2, colored_);
+    }
+    internal::RunParallel(num_shares, [&](int i) {
+      std::uint32_t offset = 0;
       for (const Strip& strip : strips) {
-        shares[thread].Add(strip.runs, first);
-        first += strip.runs.size();
+        shares[i].Add(strip.shares[i], strip.camera, offset);
+        offset += strip.num_runs;
       }
     });
-    for (const Strip& strip : strips) num_runs += strip.runs.size();
     return Write(shares, num_runs);
   }
 
  private:
-  /// Views, or with several threads parts of them, of like numbers of rows.
+  /// Views, or with several threads parts of them, and as many shares as there
+  /// are threads.
   std::vector<Strip> MakeStrips() const {
+    std::vector<std::pair<Range, Range>> regions;
+    int num_rows = 0;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      regions.push_back(RegionOfInterest(views_[i], placements_[i]));
+      if (!regions[i].first.empty()) num_rows += regions[i].second.end - regions[i].second.begin;
+    }
+    const int num_shares = internal::NumShares(num_rows, 64, options_.num_threads);
+    // Rows at the borders of strips are read twice, but threads should end at
+    // the same time.
+    const int strip_rows = num_shares == 1 ? num_rows : std::max(32, num_rows / (4 * num_shares));
     std::vector<Strip> strips;
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      const auto [columns, rows] = RegionOfInterest(views_[i], placements_[i]);
+      const auto [columns, rows] = regions[i];
       if (columns.empty() || rows.empty()) continue;
-      const int parts = options_.num_threads == 1 ? 1 : 2 * options_.num_threads;
+      const int parts = std::max((rows.end - rows.begin) / std::max(strip_rows, 1), 1);
       for (int part = 0; part < parts; ++part) {
-        const auto cut = [&](int p) {
-          return rows.begin + static_cast<int>(std::int64_t{rows.end - rows.begin} * p / parts);
+        const auto cut = [&](std::int64_t p) {
+          return rows.begin + static_cast<int>((rows.end - rows.begin) * p / parts);
         };
-        const Range some{cut(part), cut(part + 1)};
-        if (!some.empty()) strips.push_back({static_cast<std::uint32_t>(i), columns, some, {}});
+        Strip strip{static_cast<std::uint16_t>(i), columns, {cut(part), cut(part + 1)}, {}, 0};
+        strip.shares.resize(num_shares);
+        if (num_shares > 1) {
+          // About as much as there will be, in memory of this thread, which
+          // keeps it for next time.
+          const std::size_t pixels = std::size_t(columns.end - columns.begin) *
+                                     std::size_t(strip.rows.end - strip.rows.begin);
+          for (Runs& runs : strip.shares) runs.runs.reserve(pixels / 3 / num_shares);
+        }
+        strips.push_back(std::move(strip));
       }
     }
     return strips;
+  }
+
+  /// Makes the runs of a strip; calls after_row() after each row.
+  template <typename AfterRow>
+  void Walk(Strip* strip, const AfterRow& after_row) const {
+    const DepthImageView& view = views_[strip->camera];
+    DepthRows rows(view, options_, kernel_, strip->columns, &placements_[strip->camera],
+                   view.X_WC.topLeftCorner<3, 3>());
+    rows.Walk(strip->rows, [&](const SurfaceRow& row) {
+      if (colored_) {
+        AppendRuns<true>(row, view.colors + std::size_t{3} * view.width * row.v, strip);
+      } else {
+        AppendRuns<false>(row, nullptr, strip);
+      }
+      after_row();
+    });
   }
 
   FusedCloud Write(const std::vector<VoxelShare>& shares, std::size_t num_runs) const {
@@ -399,7 +452,12 @@ FusedCloud FuseDepthViews(std::span<const DepthImageView> views, const Eigen::Ma
                           const DepthOptions& options) {
   internal::CheckDepthOptions(options);
   Require(!views.empty() && views.size() < 65536, "views: expected from 1 to 65535");
-  for (const DepthImageView& view : views) internal::CheckDepthImageView(view);
+  std::size_t num_pixels = 0;
+  for (const DepthImageView& view : views) {
+    internal::CheckDepthImageView(view);
+    num_pixels += static_cast<std::size_t>(view.width) * view.height;
+  }
+  Require(num_pixels < std::size_t{1} << 32, "views: more than 2^32 pixels");
   Require(internal::IsPose(X_WB), "X_WB: must be a finite rigid transform");
   Require(size.allFinite() && size.minCoeff() > 0, "size: must be positive and finite");
   Require(voxel_size > 0 && std::isfinite(voxel_size), "voxel_size: must be positive and finite");
