@@ -219,7 +219,8 @@ class Registration {
     double squared = 0;
     if (options_.direction != IcpDirection::kModelToScene) {
       for (std::size_t i = 0; i < scene_.size(); i += scene_stride) {
-        AddPair(static_cast<std::int32_t>(i), scene_search_.Find(i, moved_[i], &squared), squared);
+        const std::int32_t j = scene_search_.Find(i, moved_[i], &squared);
+        AddPair(static_cast<std::int32_t>(i), j, squared);
       }
     }
     if (options_.direction != IcpDirection::kSceneToModel) {

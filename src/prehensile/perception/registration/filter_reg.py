@@ -53,7 +53,7 @@ class FilterRegConfig:
     min_sigma: float | None = None
     shrinkage: float = 0.9
     max_iterations: int = 200
-    tolerance: float = 1e-6
+    tolerance: float = 1e-5
     min_overlap: float = 0.3
     min_eigenvalue_ratio: float = 1e-3
 
