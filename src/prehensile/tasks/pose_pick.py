@@ -293,7 +293,14 @@ class PosePick:
         cloud = self._shape.cloud_O.transformed(X_WO)
         segments = np.zeros(len(cloud), dtype=np.int64)
         nudge = plan_nudge(
-            self._arm, memory.q, cloud, segments, self._pick_bin, self._gripper, rng, lift_height=0.2
+            self._arm,
+            memory.q,
+            cloud,
+            segments,
+            self._pick_bin,
+            self._gripper,
+            rng,
+            lift_height=0.2,
         )
         if nudge is None:
             wait = Segment.wait(memory.q, width, config.look_again)

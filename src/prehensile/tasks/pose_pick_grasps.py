@@ -91,9 +91,7 @@ def model_grasps(
     segments = np.zeros(len(cloud_O), dtype=np.int64)
     found = evaluate(candidates, cloud_O, segments, gripper, [], _CONFIG)
     feasible = np.nonzero(found.status == GraspStatus.FOUND)[0]
-    offset = np.linalg.norm(
-        np.cross(found.p_WP - p_OCm, candidates.R_WP[:, :, 0]), axis=1
-    )
+    offset = np.linalg.norm(np.cross(found.p_WP - p_OCm, candidates.R_WP[:, :, 0]), axis=1)
     score = found.score - _ARM_WEIGHT * offset / 0.05
     order = feasible[np.argsort(-score[feasible], kind="stable")]
     kept: list[int] = []

@@ -17,19 +17,20 @@ from prehensile.kinematics.analytic_ik import SrsArm, analytic_ik
 from prehensile.perception.cloud import Box
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.cartesian import plan_cartesian
-from prehensile.planning.moves import MoveOptions, free_path, holding, near, timed
+from prehensile.planning.moves import MoveOptions, free_path, holding, near, plan_move, timed
 from prehensile.planning.pick import X_GFlipped, travel_time
 from prehensile.planning.trajectory import TimedPath, time_parameterize
 from prehensile.tasks.pose_pick_grasps import ModelGrasp
 
 # What is carried turns about its two contacts, the more the harder it is shaken.
-_OPTIONS = MoveOptions(carry_speed=0.6, carry_acceleration=0.3, samples=600)
+_OPTIONS = MoveOptions(carry_speed=0.5, carry_acceleration=0.15, samples=600)
 _PREGRASP = 0.09  # m, straight line into the grasp
 _LIFT = 0.20  # m, straight up out of the bin
 _LOWER = 0.12  # m, straight down to where it is set down
 _LOWER_SPEED = 0.12  # share of the joint velocity limits
 _RETREAT = 0.10  # m, straight back from what was set down
-_SHRINK = 0.003  # m by which what is held is taken smaller: it touches the floor to begin with
+_SHRINK = 0.003  # m by which what is held is taken smaller near the floor, which it touches
+_GROW = 0.012  # m by which it is taken larger on its way: no rim may turn it in the hand
 _EXTRA_OPENING = 0.012  # m that the hand opens wider to let go than it was before it closed
 _ARM_ANGLES = np.linspace(-np.pi, np.pi, 16, endpoint=False)
 _MAX_CONFIGURATIONS = 3  # of one pose that are tried
@@ -102,8 +103,10 @@ class TransferPlanner:
         self._gripper, self._walls = gripper, walls
         half = np.abs(vertices).max(axis=0)
         self._whole = Convex(np.ascontiguousarray(vertices.T), "object")
-        shrunk = vertices * ((half - _SHRINK) / half)
-        self._held = Convex(np.ascontiguousarray(shrunk.T), "held")
+        self._held, self._carried = (
+            Convex(np.ascontiguousarray((vertices * ((half + by) / half)).T), "held")
+            for by in (-_SHRINK, _GROW)
+        )
         # Whether the hand can be at a target, by grasp, flip and target.
         self._at_target: dict[tuple[int, int, bytes], bool] = {}
 
@@ -281,7 +284,11 @@ class TransferPlanner:
         rng: np.random.Generator,
     ) -> tuple[tuple[TimedPath, TimedPath, TimedPath, TimedPath, float] | None, str]:
         """Carry, lower, retreat, home and the opening; or None and the reason."""
-        arm, width, reason = self._arm, self._release_width(grasp), "the hand cannot be at the target"
+        arm, width, reason = (
+            self._arm,
+            self._release_width(grasp),
+            "the hand cannot be at the target",
+        )
         slow = arm.limits.scaled(1.0, _OPTIONS.carry_acceleration)
         for q_end in self._free(X_WTarget @ X_OG, width, q_start):
             X_WG = arm.pose(q_end)
@@ -290,18 +297,14 @@ class TransferPlanner:
             if not back.found:
                 reason = "no straight line back from the target"
                 continue
-            with holding(arm, held):
-                with near(arm, _OPTIONS):
-                    down = plan_cartesian(arm, q_end, RigidTransform([0, 0, _LOWER]) @ X_WG)
-                if not down.found:
-                    reason = "no straight line down to the target"
-                    continue
-                path, _ = free_path(arm, q_start, down.path[-1], rng, _OPTIONS)
-                if path is None:
-                    reason = "no way to the target"
-                    continue
-                carry, _ = timed(arm, [path], [_OPTIONS.carry_speed], held, _OPTIONS)
-            if carry is None:
+            with holding(arm, held), near(arm, _OPTIONS):
+                down = plan_cartesian(arm, q_end, RigidTransform([0, 0, _LOWER]) @ X_WG)
+            if not down.found:
+                reason = "no straight line down to the target"
+                continue
+            carried = (self._carried, held[1])
+            carry = plan_move(arm, q_start, down.path[-1], rng=rng, held=carried, options=_OPTIONS)
+            if carry.motion is None:
                 reason = "no way to the target"
                 continue
             arm.set_obstacles([(self._whole, X_WTarget)])
@@ -315,7 +318,7 @@ class TransferPlanner:
                 continue
             lower = time_parameterize(down.path[::-1], slow, speed=_LOWER_SPEED)
             retreat = time_parameterize(back.path, slow, speed=0.3)
-            return (carry, lower, retreat, home, width), ""
+            return (carry.motion, lower, retreat, home, width), ""
         return None, reason
 
 

@@ -3,7 +3,6 @@
 import dataclasses as dc
 import math
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.planning import RobotDiagram
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
@@ -140,7 +138,9 @@ class PosePickReport:
     @property
     def pose_right(self) -> bool:
         """Whether the first pose that the task acted on was right: ADD-S under 5 mm."""
-        first = next((look for look in self.looks if not look.reason and look.what != "check"), None)
+        first = next(
+            (look for look in self.looks if not look.reason and look.what != "check"), None
+        )
         return first is not None and first.adds < POSE_TOLERANCE
 
     @property
@@ -258,9 +258,7 @@ class PosePickRun:
         walls = [*pick_bin.walls, *place_bin.walls]
         planner = TransferPlanner(arm, grasps, vertices, WSG50, walls)
         finder: Finder = TrueFinder(int(self._body.index()))
-        task = PosePick(
-            arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed
-        )
+        task = PosePick(arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed)
         names = list(scenario.cameras)
         inputs = {f"{name}.depth_image": AbstractValue.Make(ImageDepth32F()) for name in names}
         inputs |= {f"{name}.X_WC": AbstractValue.Make(RigidTransform()) for name in names}
@@ -279,7 +277,10 @@ class PosePickRun:
         )
         force = builder.AddNamedSystem("grip_force", ConstantVectorSource([GRIP_FORCE]))
         builder.Connect(force.get_output_port(), self.station.GetInputPort("wsg.force_limit"))
-        sources |= {"iiwa.position_measured": "position_measured", "wsg.state_measured": "hand_state"}
+        sources |= {
+            "iiwa.position_measured": "position_measured",
+            "wsg.state_measured": "hand_state",
+        }
         for source, target in sources.items():
             builder.Connect(self.station.GetOutputPort(source), self._machine.GetInputPort(target))
         for source, target in {"position": "iiwa.position", "width": "wsg.position"}.items():

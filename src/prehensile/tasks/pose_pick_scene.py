@@ -38,7 +38,12 @@ class RestPose:
 
 
 def random_rest_pose(
-    model: str, vertices: NDArray[np.float64], X_WB: RigidTransform, scenario: Scenario, *, seed: int
+    model: str,
+    vertices: NDArray[np.float64],
+    X_WB: RigidTransform,
+    scenario: Scenario,
+    *,
+    seed: int,
 ) -> RestPose:
     """Lets go of an object in the embedded bin, and waits until it rests.
 
