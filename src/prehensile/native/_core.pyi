@@ -742,3 +742,11 @@ def branch_and_bound(
     time_limit: float,
 ) -> tuple[NDArray[np.float64], float, float, bool, int]:
     """X_OW, cost, lower bound, whether the gap was reached, nodes."""
+
+def farthest_points(
+    points: ArrayLike, count: int, start: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Indices of the chosen, and how far each was from those before it."""
+
+def eliminate_samples(points: ArrayLike, count: int, radius: float) -> NDArray[np.int32]: ...
+def keep_apart(points: ArrayLike, radius: float) -> NDArray[np.int32]: ...

@@ -5,7 +5,16 @@ from prehensile.perception.cloud import Box, PointCloud, crop, inside_box, insid
 from prehensile.perception.depth import DepthConfig, normals_from_depth, unproject
 from prehensile.perception.depth_noise import DepthNoiseConfig, add_depth_noise
 from prehensile.perception.fusion import downsample, fuse
+from prehensile.perception.mesh import TriangleMesh, merge_meshes
+from prehensile.perception.mesh_file import read_mesh
+from prehensile.perception.model_mesh import mesh_of_model
 from prehensile.perception.normals import estimate_normals, orient_normals, surface_variation
+from prehensile.perception.outliers import radius_outliers, statistical_outliers
+from prehensile.perception.sampling import (
+    farthest_point_sampling,
+    sample_mesh_poisson_disc,
+    sample_mesh_uniform,
+)
 from prehensile.perception.segmentation import convex_segments, resting_pairs
 
 __all__ = [
@@ -16,18 +25,27 @@ __all__ = [
     "Distortion",
     "PointCloud",
     "PosedCamera",
+    "TriangleMesh",
     "add_depth_noise",
     "convex_segments",
     "crop",
     "downsample",
     "estimate_normals",
+    "farthest_point_sampling",
     "fuse",
     "inside_box",
     "inside_half_space",
     "merge",
+    "merge_meshes",
+    "mesh_of_model",
     "normals_from_depth",
     "orient_normals",
+    "radius_outliers",
+    "read_mesh",
     "resting_pairs",
+    "sample_mesh_poisson_disc",
+    "sample_mesh_uniform",
+    "statistical_outliers",
     "surface_variation",
     "unproject",
 ]
