@@ -19,11 +19,12 @@ constexpr double kOrigin[3] = {0, 0, 0};
 }  // namespace
 
 void Validate(const FieldGrid& grid) {
-  internal::Require(grid.spacing > 0 && std::isfinite(grid.spacing),
-                    "spacing: must be positive and finite");
+  constexpr double kFarthest = 1e9;  // So that squares stay within single precision.
+  internal::Require(grid.spacing > 0 && grid.spacing < kFarthest,
+                    "spacing: must be positive, finite and below 1e9");
   double count = 1;
   for (int k = 0; k < 3; ++k) {
-    internal::Require(std::isfinite(grid.origin[k]), "origin: must be finite");
+    internal::Require(std::abs(grid.origin[k]) < kFarthest, "origin: must be finite and below 1e9");
     internal::Require(grid.sizes[k] >= 2, "sizes: must each be at least 2");
     count *= grid.sizes[k];
   }

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
-from scipy.optimize import NonlinearConstraint, minimize
+from scipy.optimize import minimize
 
 from prehensile.perception.cloud import PointCloud, rotate
 from prehensile.perception.distance_field import DistanceField
@@ -33,7 +33,7 @@ def estimate_pose_nonlinear(
     *,
     scale: float = 0.003,
     max_iterations: int = 200,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-6,
     inlier_distance: float | None = None,
     min_overlap: float = 0.5,
 ) -> RegistrationResult:
@@ -55,7 +55,8 @@ def estimate_pose_nonlinear(
         constraints: functions of the pose whose values must not be negative.
         scale: of a named loss [m].
         max_iterations: of the optimizer.
-        tolerance: of the mean loss, relative to scale^2, at which it stops.
+        tolerance: at which the optimizer stops: of the gradient of the mean loss without
+            constraints, of its change with them; relative to scale^2.
         inlier_distance: a point no further from the model is an inlier [m]; None for 3 scales.
         min_overlap: least part of the scene that must be inliers.
 
@@ -104,15 +105,21 @@ def estimate_pose_nonlinear(
         X_WO = pose(x)
         return np.concatenate([np.atleast_1d(c(X_WO)) for c in constraints])
 
+    def slopes_of_violations(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        steps = _STEP * np.eye(6)
+        return np.stack([violations(x + h) - violations(x - h) for h in steps], axis=-1) / (
+            2 * _STEP
+        )
+
     if constraints:
-        limits = [NonlinearConstraint(violations, 0, np.inf, finite_diff_rel_step=_STEP)]
         answer = minimize(
-            cost, np.zeros(6), jac=True, method="SLSQP", constraints=limits,
+            cost, np.zeros(6), jac=True, method="SLSQP",
+            constraints={"type": "ineq", "fun": violations, "jac": slopes_of_violations},
             options={"maxiter": max_iterations, "ftol": tolerance},
         )  # fmt: skip
         converged = bool(answer.success)
     else:
-        options = {"maxiter": max_iterations, "gtol": tolerance**0.5}
+        options = {"maxiter": max_iterations, "gtol": tolerance}
         answer = minimize(cost, np.zeros(6), jac=True, method="BFGS", options=options)
         # Status 2: no further progress at the precision of the numbers.
         converged = bool(answer.success) or answer.status == 2
