@@ -123,16 +123,22 @@ std::vector<PoseVote> Cluster(std::vector<PoseVote> poses, double max_distance, 
 PointPairTable::PointPairTable(const double* points, const double* normals, std::size_t n,
                                double distance_step)
     : distance_step_(distance_step) {
-  if (n < 2 || n >= (1u << 15)) {
-    throw std::invalid_argument("points: expected 2 to 32767 rows, not " + std::to_string(n));
+  if (n < 2 || n >= (1u << 13)) {
+    throw std::invalid_argument("points: expected 2 to 8191 rows, not " + std::to_string(n));
   }
   if (!(distance_step > 0) || !std::isfinite(distance_step)) {
     throw std::invalid_argument("distance_step: must be positive and finite");
   }
   RequireFinite(points, 3 * n, "points");
   RequireFinite(normals, 3 * n, "normals");
-  points_.assign(points, points + 3 * n);
-  normals_.assign(normals, normals + 3 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (Row(normals, i).isZero()) continue;
+    points_.insert(points_.end(), points + 3 * i, points + 3 * i + 3);
+    normals_.insert(normals_.end(), normals + 3 * i, normals + 3 * i + 3);
+  }
+  points = points_.data();
+  normals = normals_.data();
+  n = num_points();
   double squared = 0;
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -153,13 +159,12 @@ PointPairTable::PointPairTable(const double* points, const double* normals, std:
   pairs.reserve(n * (n - 1));
   for (std::size_t i = 0; i < n; ++i) {
     const Vector3d p = Row(points, i), normal = Row(normals, i);
-    if (normal.isZero()) continue;
     const Matrix3d R = TurnOntoX(normal);
     for (std::size_t j = 0; j < n; ++j) {
       const Vector3d other = Row(normals, j);
       const Vector3d d = Row(points, j) - p;
       double f[4];
-      if (i == j || other.isZero() || !PairFeature(d, normal, other, distance_step, f)) continue;
+      if (i == j || !PairFeature(d, normal, other, distance_step, f)) continue;
       const int bucket =
           Bucket(static_cast<int>(f[0]), AngleBin(f[1]), AngleBin(f[2]), AngleBin(f[3]));
       pairs.push_back({static_cast<std::uint32_t>(bucket),
@@ -186,23 +191,27 @@ std::vector<PoseVote> PointPairTable::Vote(const double* points, const double* n
   RequireFinite(points, 3 * m, "points");
   RequireFinite(normals, 3 * m, "normals");
 
-  const std::size_t references = std::min<std::size_t>(num_references, m);
+  std::vector<std::size_t> rows;  // Of the points with a normal.
+  for (std::size_t i = 0; i < m; ++i) {
+    if (!Row(normals, i).isZero()) rows.push_back(i);
+  }
+  if (num_points() == 0) return {};
+  const std::size_t references = std::min<std::size_t>(num_references, rows.size());
   std::vector<std::vector<PoseVote>> found(references);
   const double longest = diameter_ + 0.5 * distance_step_;
   internal::RunShares(references, 4, num_threads, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint16_t> cells(num_points() * kTurns);
     std::vector<Peak> peaks(num_points());
     for (std::size_t r = begin; r < end; ++r) {
-      const std::size_t reference = m * (2 * r + 1) / (2 * references);
+      const std::size_t reference = rows[rows.size() * (2 * r + 1) / (2 * references)];
       const Vector3d p = Row(points, reference), normal = Row(normals, reference);
-      if (normal.isZero()) continue;
       const Matrix3d R_GW = TurnOntoX(normal);
       std::fill(cells.begin(), cells.end(), 0);
-      for (std::size_t j = 0; j < m; ++j) {
+      for (const std::size_t j : rows) {
         const Vector3d other = Row(normals, j);
         const Vector3d d = Row(points, j) - p;
         double f[4];
-        if (j == reference || d.squaredNorm() > longest * longest || other.isZero() ||
+        if (j == reference || d.squaredNorm() > longest * longest ||
             !PairFeature(d, normal, other, distance_step_, f)) {
           continue;
         }

@@ -54,13 +54,14 @@ struct PoseVote {
 /// ECCV 2016).
 class PointPairTable {
  public:
-  /// @param points n rows of x, y, z in O, 2 ≤ n < 2¹⁵.
+  /// @param points n rows of x, y, z in O, 2 ≤ n < 2¹³.
   /// @param normals n unit vectors, out of the surface. A zero normal leaves its point out.
   /// @param distance_step width of a bucket along the distance, > 0 [m].
   /// @throws std::invalid_argument if a size is wrong, a number is not finite, or the model spans
   ///   more than 64 steps.
   PointPairTable(const double* points, const double* normals, std::size_t n, double distance_step);
 
+  /// Of the points with a normal.
   std::size_t num_points() const { return points_.size() / 3; }
   std::size_t num_pairs() const { return entries_.size(); }
   /// The longest distance of two points of the model [m].

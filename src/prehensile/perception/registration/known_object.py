@@ -41,8 +41,8 @@ class KnownObject:
 
         Args:
             mesh: in O, its triangles counter-clockwise seen from outside; closed or not.
-            num_points: of the cloud, 20 to 5000. The time to look for the object grows with it.
-            field_spacing: of the distance field's nodes [m]; by default 1/60 of the diagonal of
+            num_points: of the cloud, 20 to 2000. The time to look for the object grows with it.
+            field_spacing: of the distance field's nodes [m]; by default 1/80 of the diagonal of
                 the bounding box.
             cache_dir: where the field is kept; see
                 :func:`~prehensile.perception.distance_field.cached_distance_field`.
@@ -50,10 +50,11 @@ class KnownObject:
         Raises:
             ValueError: naming the argument.
         """
-        if not 20 <= num_points <= 5000:
-            raise ValueError(f"num_points: must lie in [20, 5000], not {num_points}")
+        if not 20 <= num_points <= 2000:
+            raise ValueError(f"num_points: must lie in [20, 2000], not {num_points}")
+        points = _surface_points(mesh, 30 * num_points)
         if field_spacing is None:
-            field_spacing = mesh.diameter() / 60
+            field_spacing = mesh.diameter() / 80
         try:
             field = cached_distance_field(mesh, field_spacing, cache_dir=cache_dir)
         except ValueError as error:
@@ -61,7 +62,7 @@ class KnownObject:
                 raise
             # Not closed, as most scanned meshes: no inside, but all that is needed here.
             field = cached_distance_field(mesh, field_spacing, signed=False, cache_dir=cache_dir)
-        return _prepared(_surface_points(mesh, 30 * num_points), num_points, field)
+        return _prepared(points, num_points, field)
 
     @staticmethod
     def from_cloud(
@@ -78,13 +79,13 @@ class KnownObject:
             InputError: if the cloud has no normals or too few points.
             ValueError: naming the argument.
         """
-        if not 20 <= num_points <= 5000:
-            raise ValueError(f"num_points: must lie in [20, 5000], not {num_points}")
+        if not 20 <= num_points <= 2000:
+            raise ValueError(f"num_points: must lie in [20, 2000], not {num_points}")
         cloud.require_normals()
         if len(cloud) < num_points:
             raise InputError(f"the cloud has {len(cloud)} points; expected at least {num_points}")
         if field_spacing is None:
-            field_spacing = float(np.linalg.norm(np.ptp(cloud.points, axis=0))) / 60
+            field_spacing = float(np.linalg.norm(np.ptp(cloud.points, axis=0))) / 80
         return _prepared(cloud, num_points, DistanceField.from_cloud(cloud, field_spacing))
 
 

@@ -29,9 +29,9 @@ class LocateConfig:
             much else in them.
         max_candidates: poses from the vote that are refined, at least 1.
         max_finalists: of those, poses apart from each other that are refined on all points.
-        tolerance: how far a point of the object, averaged over a voxel, may lie off its surface
-            [m], > 0: some 1.5 times the noise of the camera.
-        max_normal_angle: and how far its normal may be off [rad].
+        tolerance: how far a point of the object may lie off its surface [m], > 0: some 1.5 times
+            the noise of the camera.
+        max_normal_angle: how far a normal of the object, averaged over a voxel, may be off [rad].
         min_coverage: part of the object's surface towards the sensor that must be seen where the
             pose says, in [0, 1].
         min_agreement: part of the points near the object that must lie on its surface, in [0, 1].
@@ -49,7 +49,7 @@ class LocateConfig:
     max_normal_angle: float = 0.45
     min_coverage: float = 0.35
     min_agreement: float = 0.35
-    min_score: float = 0.4
+    min_score: float = 0.55
     max_violation: float = 0.1
     ambiguity: float = 3.0
 
@@ -286,38 +286,66 @@ def _violation(
 
 
 def _evidence(
-    scene: PointCloud, thinned: PointCloud, model: KnownObject, config: LocateConfig, best: _Fit
+    scene: PointCloud,
+    thinned: PointCloud,
+    model: KnownObject,
+    config: LocateConfig,
+    best: _Fit,
 ) -> tuple[float, float]:
     """Coverage and agreement; see LocateResult."""
-    cosine = np.cos(config.max_normal_angle)
-    p_OS = _in_object(thinned.points, best.X_WO)
-    n_O = thinned.require_normals() @ best.X_WO[:3, :3]
-    at = model.field.at(p_OS)
-    distance = np.abs(at.distances)
-    # Without signs, the gradient of a field is of either side.
-    on = (distance < config.tolerance) & (np.abs(np.einsum("ij,ij->i", at.gradients, n_O)) > cosine)
-    near = distance < 0.1 * model.diameter
-    agreement = float(on.sum() / max(int(near.sum()), 1))
+    distances = np.abs(model.field.at(_in_object(scene.points, best.X_WO)).distances)
+    near = distances < 0.1 * model.diameter
+    agreement = float((distances < config.tolerance).sum() / max(int(near.sum()), 1))
 
+    voxel = config.voxel_fraction * model.diameter
+    p_OS = _in_object(thinned.points, best.X_WO)
+    n_OS = thinned.require_normals() @ best.X_WO[:3, :3]
     points, normals = model.cloud.points, model.cloud.require_normals()
-    facing = np.zeros(len(points), dtype=bool)
-    if scene.sensor_origins is not None:
-        step = max(1, len(scene) // 64)
-        for p_WS in np.unique(scene.sensor_origins[::step], axis=0):
-            sight = _in_object(p_WS[None], best.X_WO) - points
-            sight /= np.linalg.norm(sight, axis=1, keepdims=True)
-            facing |= np.einsum("ij,ij->i", sight, normals) > 0.3
-    else:  # What is seen looks toward the sensor: take its mean direction.
-        facing = normals @ n_O.mean(axis=0) > 0.3 * np.linalg.norm(n_O.mean(axis=0))
-    rows, gap = _core.KdTree(p_OS).nearest(points[facing], 1, np.inf, 1)
-    rows, gap = rows[:, 0], gap[:, 0]
-    offset = np.abs(np.einsum("ij,ij->i", p_OS[rows] - points[facing], normals[facing]))
+    expected = np.zeros(len(points), dtype=bool)
+    for p_OE in _in_object(_sensors(scene, thinned, model), best.X_WO):
+        expected |= _in_sight(points, normals, p_OS, p_OE, voxel)
+    points, normals = points[expected], normals[expected]
+    rows, gap = _nearest(p_OS, points)
+    offset = np.abs(np.einsum("ij,ij->i", p_OS[rows] - points, normals))
     seen = (
-        (gap < 1.1 * config.voxel_fraction * model.diameter)
+        (gap < 1.1 * voxel)
         & (offset < 1.5 * config.tolerance)
-        & (np.einsum("ij,ij->i", n_O[rows], normals[facing]) > cosine)
+        & (np.einsum("ij,ij->i", n_OS[rows], normals) > np.cos(config.max_normal_angle))
     )
-    return float(seen.sum() / max(int(facing.sum()), 1)), agreement
+    return float(seen.sum() / max(len(points), 1)), agreement
+
+
+def _sensors(scene: PointCloud, thinned: PointCloud, model: KnownObject) -> NDArray[np.float64]:
+    """Where the sensors are, (S, 3) in W; far off in the direction of the normals, if not known."""
+    if scene.sensor_origins is not None:
+        return np.unique(scene.sensor_origins[:: max(1, len(scene) // 64)], axis=0)
+    direction = thinned.require_normals().mean(axis=0)
+    direction /= max(float(np.linalg.norm(direction)), 1e-12)
+    return (thinned.points.mean(axis=0) + 100 * model.diameter * direction)[None]
+
+
+def _in_sight(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    others: NDArray[np.float64],
+    eye: NDArray[np.float64],
+    voxel: float,
+) -> NDArray[np.bool_]:
+    """Which points look towards an eye and have no other point well before them."""
+    sight, others_sight = points - eye, others - eye
+    range_ = np.linalg.norm(sight, axis=1)
+    others_range = np.linalg.norm(others_sight, axis=1)
+    facing = -np.einsum("ij,ij->i", sight, normals) > 0.3 * range_
+    rows, angle = _nearest(others_sight / others_range[:, None], sight / range_[:, None])
+    hidden = (angle * range_ < voxel) & (others_range[rows] < range_ - voxel)
+    return facing & ~hidden
+
+
+def _nearest(
+    points: NDArray[np.float64], queries: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    rows, distances = _core.KdTree(points).nearest(queries, 1, np.inf, 1)
+    return rows[:, 0], distances[:, 0]
 
 
 def _judged(

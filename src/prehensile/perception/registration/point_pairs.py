@@ -32,7 +32,7 @@ class PointPairModel:
     (Hinterstoisser et al., "Going further with point pair features", ECCV 2016).
 
     Args:
-        cloud: points on the model's surface with outward normals, 2 to 32767 of them, evenly
+        cloud: points on the model's surface with outward normals, 2 to 8191 of them, evenly
             spread: some 300 to 800. Time and memory grow with their square (500: 25 ms, 1 MB).
         distance_step: width of a bucket along the distance; by default a twentieth of the model's
             diameter [m].
