@@ -82,10 +82,18 @@ std::vector<TrackedBody> Bodies(const Fields& fields, nb::handle X_WB, const cha
 }
 
 nb::object PointsNear(const nb::list& views, const Fields& fields, nb::handle X_WB,
-                      const Fields& other_fields, nb::handle X_WK, double max_distance,
-                      double other_margin, int max_pixels) {
+                      nb::handle boxes_B, const Fields& other_fields, nb::handle X_WK,
+                      double max_distance, double other_margin, int max_pixels) {
   const Views images(views);
-  const std::vector<TrackedBody> bodies = Bodies(fields, X_WB, "X_WB");
+  std::vector<TrackedBody> bodies = Bodies(fields, X_WB, "X_WB");
+  const ArrayArgument boxes(boxes_B, "boxes");
+  boxes.RequireShape({static_cast<std::ptrdiff_t>(bodies.size()), 2, 3});
+  boxes.RequireFinite();
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const double* const box = boxes.data() + 6 * i;
+    bodies[i].box.extend(Eigen::Vector3d(box[0], box[1], box[2]));
+    bodies[i].box.extend(Eigen::Vector3d(box[3], box[4], box[5]));
+  }
   const std::vector<TrackedBody> others = Bodies(other_fields, X_WK, "X_WK");
   std::vector<double> points;
   {
@@ -165,8 +173,8 @@ nb::object Violation(nb::handle points_W, const nb::list& view, double margin) {
 }  // namespace
 
 void BindTracking(nb::module_& m) {
-  m.def("points_near_bodies", &PointsNear, "views"_a, "fields"_a, "X_WB"_a, "other_fields"_a,
-        "X_WK"_a, "max_distance"_a, "other_margin"_a, "max_pixels"_a);
+  m.def("points_near_bodies", &PointsNear, "views"_a, "fields"_a, "X_WB"_a, "boxes"_a,
+        "other_fields"_a, "X_WK"_a, "max_distance"_a, "other_margin"_a, "max_pixels"_a);
   m.def("body_terms", &Terms, "points"_a, "fields"_a, "X_WB"_a, "loss"_a, "loss_scale"_a, "views"_a,
         "samples"_a, "margin"_a, "max_violation"_a, "search_radius"_a, "free_space_weight"_a);
   m.def("free_space_violation", &Violation, "points_W"_a, "view"_a, "margin"_a);

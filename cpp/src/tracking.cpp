@@ -1,6 +1,5 @@
 #include "prehensile/tracking.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -32,10 +31,15 @@ void Check(const std::vector<TrackedBody>& bodies, const char* message) {
   for (const TrackedBody& body : bodies) Require(body.field != nullptr, message);
 }
 
-/// The box of a field's grid, in B.
+/// Where a body's surface can be, in B.
 struct Box {
-  explicit Box(const DistanceField& field) {
-    const FieldGrid& grid = field.grid();
+  explicit Box(const TrackedBody& body) {
+    if (!body.box.isEmpty()) {
+      lower = body.box.min();
+      upper = body.box.max();
+      return;
+    }
+    const FieldGrid& grid = body.field->grid();
     for (int i = 0; i < 3; ++i) {
       lower[i] = grid.origin[i];
       upper[i] = grid.origin[i] + grid.spacing * (grid.sizes[i] - 1);
@@ -200,8 +204,8 @@ std::vector<double> PointsNearBodies(const std::vector<DepthView>& views,
   Require(max_pixels >= 1, "max_pixels: must be at least 1");
   std::vector<Box> boxes;
   std::vector<Box> other_boxes;
-  for (const TrackedBody& body : bodies) boxes.emplace_back(*body.field);
-  for (const TrackedBody& other : others) other_boxes.emplace_back(*other.field);
+  for (const TrackedBody& body : bodies) boxes.emplace_back(body);
+  for (const TrackedBody& other : others) other_boxes.emplace_back(other);
 
   std::vector<double> points;
   for (const DepthView& view : views) {
@@ -251,7 +255,7 @@ std::vector<BodyTerm> SurfaceTerms(const double* points, std::size_t n,
   Check(bodies, "bodies: each needs a field");
   Require(loss_scale > 0 && std::isfinite(loss_scale), "loss_scale: must be positive");
   std::vector<Box> boxes;
-  for (const TrackedBody& body : bodies) boxes.emplace_back(*body.field);
+  for (const TrackedBody& body : bodies) boxes.emplace_back(body);
   std::vector<BodyTerm> terms(bodies.size());
   const double c2 = loss_scale * loss_scale;
   for (std::size_t k = 0; k < n; ++k) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -38,6 +39,8 @@ struct TrackedBody {
   const DistanceField* field = nullptr;
   Eigen::Matrix3d R_WB = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
+  /// A box around its surface, along B's axes; that of the field's grid if it is empty.
+  Eigen::AlignedBox3d box;
 };
 
 /// Points measured near the bodies.

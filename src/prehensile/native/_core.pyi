@@ -473,13 +473,15 @@ def points_near_bodies(
     views: list[tuple[NDArray[np.float32], ArrayLike, ArrayLike, NDArray[np.uint8] | None]],
     fields: list[DistanceField],
     X_WB: ArrayLike,
+    boxes: ArrayLike,
     other_fields: list[DistanceField],
     X_WK: ArrayLike,
     max_distance: float,
     other_margin: float,
     max_pixels: int,
 ) -> NDArray[np.float64]:
-    """(M, 3) measured points near the bodies' surfaces and not nearer to the others."""
+    """(M, 3) measured points near the bodies' surfaces and not nearer to the others; boxes (L, 2, 3)
+    are the least and greatest coordinates of each in B."""
 
 def body_terms(
     points: ArrayLike,

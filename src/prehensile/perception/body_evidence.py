@@ -59,6 +59,11 @@ class Body:
                 "normals: expected one for each of the points, of which there are some"
             )
 
+    def box(self) -> Array:
+        """(2, 3) least and greatest coordinates of what is known of its surface, in B [m]."""
+        known = self.points if self.corners is None else np.vstack([self.points, self.corners])
+        return np.stack([known.min(axis=0), known.max(axis=0)])
+
     @staticmethod
     def from_mesh(
         mesh: TriangleMesh,
@@ -193,6 +198,7 @@ class BodyEvidence:
         config: EvidenceConfig,
     ) -> None:
         self._fields = [body.field.core for body in bodies]
+        self._boxes = np.array([body.box() for body in bodies]).reshape(-1, 2, 3)
         self._samples = [(body.points, body.normals) for body in bodies]
         self._views = [view.native() for view in views]
         self._other_fields = [field.core for field, _ in occluders]
@@ -206,6 +212,7 @@ class BodyEvidence:
             self._views,
             self._fields,
             X_WB,
+            self._boxes,
             self._other_fields,
             self._X_WK,
             max_distance,
