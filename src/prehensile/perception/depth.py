@@ -32,7 +32,9 @@ class DepthConfig:
     # Largest angle between normal and line of sight [rad]; flatter views carry no usable normal.
     max_incidence: float = float(np.deg2rad(83.0))
     # The standard deviation of the depth z is noise_constant + noise_quadratic z^2 [m], [1/m];
-    # 0 or more. Where there is noise, a larger window pays.
+    # 0 or more. A larger window then averages more of it, and rounds off more: in a bin 0.9 m away
+    # 7 pixels suit a noise of 0.001 and 0.002 that differs from pixel to pixel, and 9 to 11 that
+    # of a D415 (DepthNoiseConfig), 0 and 0.0026, which neighbours share.
     noise_constant: float = 0.0
     noise_quadratic: float = 0.0
 
