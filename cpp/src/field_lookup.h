@@ -36,27 +36,49 @@ struct FieldLanes<double> {
   using Type = double __attribute__((vector_size(32)));
 };
 
-/// See DistanceField::OrientedAt.
+/// Where a point is in the grid.
 template <typename Scalar>
-[[gnu::always_inline]] static inline FieldValue<Scalar> LookUp(const FieldView<Scalar>& field,
-                                                               const Scalar* p) {
-  using Node = typename FieldLanes<float>::Type;
-  using Lanes = typename FieldLanes<Scalar>::Type;
+struct FieldCell {
+  /// The node of the cell with the lowest indices.
+  std::int32_t node;
+  /// Where in the cell, 0 to 1; of a point outside, the nearest point of the grid.
+  Scalar t[3];
+  /// How far outside the grid, in cells.
+  Scalar beyond[3];
+};
+
+/// Without branches, for the compiler to vectorize in a loop.
+template <typename Scalar>
+[[gnu::always_inline]] static inline FieldCell<Scalar> Locate(const FieldView<Scalar>& field,
+                                                              Scalar x, Scalar y, Scalar z) {
+  FieldCell<Scalar> cell;
   std::int32_t index[3];
-  Scalar t[3];       // Where in the cell, 0 to 1.
-  Scalar beyond[3];  // How far outside the grid, in cells.
+  const Scalar p[3] = {x, y, z};
   for (int k = 0; k < 3; ++k) {
     const Scalar u = (p[k] - field.origin[k]) * field.inverse_spacing;
     const auto last = static_cast<Scalar>(field.sizes[k] - 1);
-    const Scalar inside = u > 0 ? (u < last ? u : last) : Scalar{0};
-    beyond[k] = u - inside;
-    const auto cell = static_cast<std::int32_t>(inside);
-    index[k] = cell < field.sizes[k] - 1 ? cell : field.sizes[k] - 2;
-    t[k] = inside - static_cast<Scalar>(index[k]);
+    const Scalar above = u > 0 ? u : Scalar{0};
+    const Scalar inside = above < last ? above : last;
+    cell.beyond[k] = u - inside;
+    const auto i = static_cast<std::int32_t>(inside);
+    index[k] = i < field.sizes[k] - 1 ? i : field.sizes[k] - 2;
+    cell.t[k] = inside - static_cast<Scalar>(index[k]);
   }
+  cell.node = (index[0] * field.sizes[1] + index[1]) * field.sizes[2] + index[2];
+  return cell;
+}
+
+/// The value at a place in the grid; see DistanceField::OrientedAt.
+template <typename Scalar>
+[[gnu::always_inline]] static inline FieldValue<Scalar> Blend(const FieldView<Scalar>& field,
+                                                              const FieldCell<Scalar>& cell) {
+  using Node = typename FieldLanes<float>::Type;
+  using Lanes = typename FieldLanes<Scalar>::Type;
+  const Scalar* const t = cell.t;
+  const Scalar* const beyond = cell.beyond;
   const std::ptrdiff_t step_y = field.sizes[2];
   const std::ptrdiff_t step_x = step_y * field.sizes[1];
-  const float* const first = field.nodes + 4 * (index[0] * step_x + index[1] * step_y + index[2]);
+  const float* const first = field.nodes + 4 * static_cast<std::ptrdiff_t>(cell.node);
 
   Node corners[8];
   for (int c = 0; c < 8; ++c) {
@@ -113,6 +135,13 @@ template <typename Scalar>
     }
   }
   return value;
+}
+
+/// See DistanceField::OrientedAt.
+template <typename Scalar>
+[[gnu::always_inline]] static inline FieldValue<Scalar> LookUp(const FieldView<Scalar>& field,
+                                                               const Scalar* p) {
+  return Blend(field, Locate(field, p[0], p[1], p[2]));
 }
 
 }  // namespace prehensile::internal

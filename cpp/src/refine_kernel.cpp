@@ -23,13 +23,30 @@ void LookUpAll(const FieldView<float>& field, const RefinePoints& points, std::s
     rows.pz[i] = R[6] * x + R[7] * y + R[8] * z + t[2];
     rows.valid[i] = points.present[i];
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    const float p[3] = {rows.px[i], rows.py[i], rows.pz[i]};
-    const FieldValue<float> value = LookUp(field, p);
-    rows.r[i] = value.distance;
-    rows.gx[i] = value.gradient[0];
-    rows.gy[i] = value.gradient[1];
-    rows.gz[i] = value.gradient[2];
+  constexpr std::size_t kBlock = 64;
+  for (std::size_t begin = 0; begin < n; begin += kBlock) {
+    const std::size_t count = begin + kBlock < n ? kBlock : n - begin;
+    std::int32_t node[kBlock];
+    float t[3][kBlock], beyond[3][kBlock];
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = begin + k;
+      const FieldCell<float> cell = Locate(field, rows.px[i], rows.py[i], rows.pz[i]);
+      node[k] = cell.node;
+      for (int axis = 0; axis < 3; ++axis) {
+        t[axis][k] = cell.t[axis];
+        beyond[axis][k] = cell.beyond[axis];
+      }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = begin + k;
+      const FieldCell<float> cell{
+          node[k], {t[0][k], t[1][k], t[2][k]}, {beyond[0][k], beyond[1][k], beyond[2][k]}};
+      const FieldValue<float> value = Blend(field, cell);
+      rows.r[i] = value.distance;
+      rows.gx[i] = value.gradient[0];
+      rows.gy[i] = value.gradient[1];
+      rows.gz[i] = value.gradient[2];
+    }
   }
   if (!points.nx) return;
   for (std::size_t i = 0; i < n; ++i) {
