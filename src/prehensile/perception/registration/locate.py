@@ -10,28 +10,30 @@ from pydrake.math import RigidTransform
 from prehensile.errors import InputError
 from prehensile.native import _core
 from prehensile.perception.cloud import PointCloud
-from prehensile.perception.free_space import DepthView, free_space_violation
+from prehensile.perception.free_space import DepthView
 from prehensile.perception.fusion import downsample
 from prehensile.perception.normals import estimate_normals
+from prehensile.perception.registration.evidence import (
+    Evidence,
+    EvidenceConfig,
+    in_object,
+    violation,
+    weigh,
+)
 from prehensile.perception.registration.known_object import KnownObject
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
 
 @dataclass(frozen=True)
-class LocateConfig:
-    """How an object is looked for.
+class LocateConfig(EvidenceConfig):
+    """How an object is looked for; the first fields are those of EvidenceConfig.
 
     Attributes:
-        voxel_fraction: the scene is thinned to voxels of this part of the object's diameter, in
-            (0, 0.2].
         num_references: points of the scene that vote for poses, at least 1; more for scenes with
             much else in them.
         max_candidates: poses from the vote that are refined, at least 1.
         max_finalists: of those, poses apart from each other that are refined on all points.
-        tolerance: how far a point of the object may lie off its surface [m], > 0: some 1.5 times
-            the noise of the camera.
-        max_normal_angle: how far a normal of the object, averaged over a voxel, may be off [rad].
         min_coverage: part of the object's surface towards the sensor that must be seen where the
             pose says, in [0, 1].
         min_agreement: part of the points near the object that must lie on its surface, in [0, 1].
@@ -41,12 +43,9 @@ class LocateConfig:
         ambiguity: the best pose must fit better than any other by so many standard errors.
     """
 
-    voxel_fraction: float = 0.04
     num_references: int = 25
     max_candidates: int = 20
     max_finalists: int = 4
-    tolerance: float = 0.002
-    max_normal_angle: float = 0.45
     min_coverage: float = 0.35
     min_agreement: float = 0.35
     min_score: float = 0.55
@@ -161,21 +160,23 @@ def locate(
     apart = _apart(coarse, model)[: config.max_finalists]
     starts = np.stack([fit.X_WO for fit in apart])
     fits = _refine(model, points, starts, config, coarse=False, num_threads=num_threads)
-    violations = [0.0] * len(fits)
-    if not isinstance(views, Sequence) or len(views):
-        violations = [_violation(model, fit, views, config) for fit in fits]
-        order = np.argsort(
-            [f.cost / _scale(config) ** 2 + v for f, v in zip(fits, violations, strict=True)],
-            kind="stable",
-        )
-        fits, violations = [fits[i] for i in order], [violations[i] for i in order]
-    best = fits[0]
-    others = [
+    if looks := _as_tuple(views):
+        squared = _scale(config) ** 2
+        fits.sort(key=lambda fit: fit.cost / squared + violation(model, fit.X_WO, looks, config))
+    # Of poses between which the points do not decide, the evidence beyond the points may.
+    rivals = [fits[0]] + [
         fit
         for fit in _apart(fits, model)[1:]
-        if _margin(model, points, best, fit, config) < config.ambiguity
+        if _margin(model, points, fits[0], fit, config) < config.ambiguity
     ]
-    return _judged(scene, thinned, model, config, best, violations[0], others)
+    weighed = [(weigh(scene, thinned, model, fit.X_WO, looks, config), fit) for fit in rivals]
+    most = max(evidence.score for evidence, _ in weighed)
+    (evidence, best), *others = [w for w in weighed if w[0].score >= 0.8 * most]
+    return _judged(scene, model, config, best, evidence, [fit for _, fit in others])
+
+
+def _as_tuple(views: DepthView | Sequence[DepthView]) -> tuple[DepthView, ...]:
+    return (views,) if isinstance(views, DepthView) else tuple(views)
 
 
 def _thinned(scene: PointCloud, voxel: float, num_threads: int) -> PointCloud:
@@ -250,10 +251,6 @@ def _apart(fits: Sequence[_Fit], model: KnownObject) -> list[_Fit]:
     return kept
 
 
-def _in_object(points: NDArray[np.float64], X_WO: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (points - X_WO[:3, 3]) @ X_WO[:3, :3]
-
-
 def _margin(
     model: KnownObject, points: NDArray[np.float64], best: _Fit, other: _Fit, config: LocateConfig
 ) -> float:
@@ -265,7 +262,7 @@ def _margin(
     squared = _scale(config) ** 2
 
     def losses(fit: _Fit) -> NDArray[np.float64]:
-        d = model.field.at(_in_object(points, fit.X_WO)).distances
+        d = model.field.at(in_object(points, fit.X_WO)).distances
         return d * d / (d * d + squared)
 
     difference = losses(other) - losses(best)
@@ -273,110 +270,35 @@ def _margin(
     return float(difference.mean()) / max(error, 1e-12)
 
 
-def _violation(
-    model: KnownObject,
-    fit: _Fit,
-    views: DepthView | Sequence[DepthView],
-    config: LocateConfig,
-) -> float:
-    """Part of the object's points that lie where a camera saw nothing."""
-    p_W = model.cloud.points @ fit.X_WO[:3, :3].T + fit.X_WO[:3, 3]
-    margin = 5 * config.tolerance
-    return float(np.mean(free_space_violation(p_W, views, margin=margin) > 0))
-
-
-def _evidence(
-    scene: PointCloud,
-    thinned: PointCloud,
-    model: KnownObject,
-    config: LocateConfig,
-    best: _Fit,
-) -> tuple[float, float]:
-    """Coverage and agreement; see LocateResult."""
-    distances = np.abs(model.field.at(_in_object(scene.points, best.X_WO)).distances)
-    near = distances < 0.1 * model.diameter
-    agreement = float((distances < config.tolerance).sum() / max(int(near.sum()), 1))
-
-    voxel = config.voxel_fraction * model.diameter
-    p_OS = _in_object(thinned.points, best.X_WO)
-    n_OS = thinned.require_normals() @ best.X_WO[:3, :3]
-    points, normals = model.cloud.points, model.cloud.require_normals()
-    expected = np.zeros(len(points), dtype=bool)
-    for p_OE in _in_object(_sensors(scene, thinned, model), best.X_WO):
-        expected |= _in_sight(points, normals, p_OS, p_OE, voxel)
-    points, normals = points[expected], normals[expected]
-    rows, gap = _nearest(p_OS, points)
-    offset = np.abs(np.einsum("ij,ij->i", p_OS[rows] - points, normals))
-    seen = (
-        (gap < 1.1 * voxel)
-        & (offset < 1.5 * config.tolerance)
-        & (np.einsum("ij,ij->i", n_OS[rows], normals) > np.cos(config.max_normal_angle))
-    )
-    return float(seen.sum() / max(len(points), 1)), agreement
-
-
-def _sensors(scene: PointCloud, thinned: PointCloud, model: KnownObject) -> NDArray[np.float64]:
-    """Where the sensors are, (S, 3) in W; far off in the direction of the normals, if not known."""
-    if scene.sensor_origins is not None:
-        return np.unique(scene.sensor_origins[:: max(1, len(scene) // 64)], axis=0)
-    direction = thinned.require_normals().mean(axis=0)
-    direction /= max(float(np.linalg.norm(direction)), 1e-12)
-    return (thinned.points.mean(axis=0) + 100 * model.diameter * direction)[None]
-
-
-def _in_sight(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    others: NDArray[np.float64],
-    eye: NDArray[np.float64],
-    voxel: float,
-) -> NDArray[np.bool_]:
-    """Which points look towards an eye and have no other point well before them."""
-    sight, others_sight = points - eye, others - eye
-    range_ = np.linalg.norm(sight, axis=1)
-    others_range = np.linalg.norm(others_sight, axis=1)
-    facing = -np.einsum("ij,ij->i", sight, normals) > 0.3 * range_
-    rows, angle = _nearest(others_sight / others_range[:, None], sight / range_[:, None])
-    hidden = (angle * range_ < voxel) & (others_range[rows] < range_ - voxel)
-    return facing & ~hidden
-
-
-def _nearest(
-    points: NDArray[np.float64], queries: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    rows, distances = _core.KdTree(points).nearest(queries, 1, np.inf, 1)
-    return rows[:, 0], distances[:, 0]
-
-
 def _judged(
     scene: PointCloud,
-    thinned: PointCloud,
     model: KnownObject,
     config: LocateConfig,
     best: _Fit,
-    violation: float,
+    evidence: Evidence,
     others: Sequence[_Fit],
 ) -> LocateResult:
     """The best pose with its status."""
-    distances = np.abs(model.field.at(_in_object(scene.points, best.X_WO)).distances)
+    distances = np.abs(model.field.at(in_object(scene.points, best.X_WO)).distances)
     inliers = distances < 2 * config.tolerance
-    coverage, agreement = _evidence(scene, thinned, model, config, best)
     center = scene.points[inliers].mean(axis=0) if inliers.any() else best.X_WO[:3, 3]
     covariance, free = _uncertainty(model, best, center)
 
     status, message = RegistrationStatus.SUCCESS, ""
-    if violation > config.max_violation:
+    if evidence.violation > config.max_violation:
         status = RegistrationStatus.NO_CONSENSUS
-        message = f"{violation:.0%} of the object would be where a camera saw nothing"
-    elif agreement < config.min_agreement:
+        message = f"{evidence.violation:.0%} of the object would be where a camera saw nothing"
+    elif evidence.agreement < config.min_agreement:
         status = RegistrationStatus.NO_CONSENSUS
-        message = f"only {agreement:.0%} of the points around the best pose lie on the object"
-    elif coverage < config.min_coverage:
+        message = (
+            f"only {evidence.agreement:.0%} of the points around the best pose lie on the object"
+        )
+    elif evidence.coverage < config.min_coverage:
         status = RegistrationStatus.LOW_OVERLAP
-        message = f"only {coverage:.0%} of the side towards the sensor is seen"
-    elif coverage * agreement < config.min_score:
+        message = f"only {evidence.coverage:.0%} of the side towards the sensor is seen"
+    elif evidence.score < config.min_score:
         status = RegistrationStatus.NO_CONSENSUS
-        message = f"coverage {coverage:.2f} and agreement {agreement:.2f} are too low together"
+        message = f"coverage {evidence.coverage:.2f} and agreement {evidence.agreement:.2f} are low"
     elif len(free):
         status = RegistrationStatus.DEGENERATE
         message = "the points leave a motion of the object free"
@@ -392,8 +314,8 @@ def _judged(
         covariance=covariance,
         free_directions=free,
         message=message,
-        coverage=coverage,
-        agreement=agreement,
+        coverage=evidence.coverage,
+        agreement=evidence.agreement,
         alternatives=tuple(_transform(other.X_WO) for other in others),
     )
 
