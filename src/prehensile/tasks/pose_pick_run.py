@@ -20,14 +20,17 @@ from prehensile.behavior.state_machine import Senses, StateMachine
 from prehensile.grasping import WSG50
 from prehensile.models.registry import find_model
 from prehensile.models.shapes.gltf import read_gltf
+from prehensile.perception.mesh import TriangleMesh
+from prehensile.perception.registration.known_object import KnownObject
 from prehensile.planning.arm import ArmModel
 from prehensile.scenes.clutter import PlacedObject, with_objects
 from prehensile.station.build import build
 from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario
-from prehensile.tasks.clear_bin_run import bin_geometry
+from prehensile.tasks.clear_bin_run import bin_geometry, intrinsics
 from prehensile.tasks.pose_pick import Finder, KnownShape, Look, Memory, PosePick, Sight
+from prehensile.tasks.pose_pick_finder import CameraFinder
 from prehensile.tasks.pose_pick_grasps import collision_cloud, model_grasps
 from prehensile.tasks.pose_pick_moves import TransferPlanner
 from prehensile.tasks.pose_pick_scene import random_rest_pose
@@ -40,6 +43,7 @@ POSE_TOLERANCE = 0.005  # m of ADD-S, within which a pose counts as right
 POSITION_TOLERANCE = 0.02  # m of the bottle's origin from its goal
 UPRIGHT_TOLERANCE = math.radians(5.0)
 _AT_REST = 0.01  # m/s and rad/s
+_FIND, _CHECK = ("camera0", "camera1", "camera2"), ("camera3",)
 _STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C
 
 # Noise of the three cameras over the first bin, each with a seed of its own; and a fourth camera,
@@ -258,6 +262,12 @@ class PosePickRun:
         walls = [*pick_bin.walls, *place_bin.walls]
         planner = TransferPlanner(arm, grasps, vertices, WSG50, walls)
         finder: Finder = TrueFinder(int(self._body.index()))
+        if not cheat:
+            known = KnownObject.from_mesh(TriangleMesh(vertices, faces))
+            models = {name: intrinsics(config) for name, config in scenario.cameras.items()}
+            finder = CameraFinder(
+                known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries
+            )
         task = PosePick(arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed)
         names = list(scenario.cameras)
         inputs = {f"{name}.depth_image": AbstractValue.Make(ImageDepth32F()) for name in names}
