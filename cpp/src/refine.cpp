@@ -189,11 +189,8 @@ class Refiner {
     return {max_iterations, false};
   }
 
-  /// Mean loss over the first points of the scene at the final scale.
-  double FinalCost(const Placement& at, std::size_t num_points) {
-    num_points_ = std::min(num_points, scene_.size());
-    padded_ = std::min(Padded(num_points_), stride_);
-    LookUp(at, rows_[0]);
+  /// Mean loss, at the final scale, of the points that Descend() looked at, where it ended.
+  double FinalCost() {
     return Cost(rows_[0], options_.scale, MaxDistance(rows_[0], options_.scale));
   }
 
@@ -338,7 +335,7 @@ std::vector<RefinedPose> RefinePoses(const double* points, const double* normals
               .Descend(options.num_coarse_points, options.initial_scale,
                        options.max_coarse_iterations, kCoarseTolerance * options.scale, &places[i])
               .first;
-      poses[i].cost = refiner.FinalCost(places[i], options.num_coarse_points);
+      poses[i].cost = refiner.FinalCost();
     }
   });
 
@@ -356,7 +353,7 @@ std::vector<RefinedPose> RefinePoses(const double* points, const double* normals
       poses[i].iterations = iterations;
       poses[i].converged = converged;
       poses[i].is_finalist = true;
-      poses[i].cost = refiner.FinalCost(places[i], n);
+      poses[i].cost = refiner.FinalCost();
       refiner.Information(places[i], &poses[i]);
     }
   });
