@@ -321,3 +321,21 @@ def test_downsampling_keeps_what_is_known() -> None:
     np.testing.assert_array_equal(bare.points, small.points)
     assert bare.normals is None
     assert bare.colors is None
+
+
+@settings(max_examples=20, deadline=None)
+@given(voxel=st.floats(0.02, 0.5), seed=st.integers(0, 2**32 - 1))
+def test_downsampled_colors_are_means_over_voxels(voxel: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-0.3, 0.3, (500, 3))
+    colors = rng.integers(0, 256, (500, 3), dtype=np.uint8)
+    cloud = downsample(PointCloud(points, colors=colors, labels=np.arange(500)), voxel)
+    assert cloud.colors is not None
+    assert cloud.labels is not None
+    cells = np.floor(points * (1 / voxel))
+    assert len(cloud) == len(np.unique(cells, axis=0))
+    for i in range(0, len(cloud), 7):
+        members = (cells == cells[cloud.labels[i]]).all(axis=1)
+        assert cloud.labels[i] == np.nonzero(members)[0][0]
+        np.testing.assert_allclose(cloud.points[i], points[members].mean(axis=0), atol=1e-12)
+        np.testing.assert_array_equal(cloud.colors[i], np.rint(colors[members].mean(axis=0)))
