@@ -46,10 +46,10 @@ def sample_mesh_poisson_disc(
 
     Given a count, five times as many uniform samples are thinned out by elimination (Yuksel,
     "Sample elimination for generating Poisson disk sample sets", 2015), which keeps neighbours
-    some 0.7 of the distance of a perfect hexagonal pattern apart. Given a radius, uniform samples are
-    thrown and kept if they are at least that far from all kept before (dart throwing; Cook, 1986),
-    until hardly a gap is left that could hold another. Distances are straight through space, so
-    both sides of a thin sheet share their points' room.
+    some 0.7 of the distance of a perfect hexagonal pattern apart. Given a radius, uniform samples
+    are thrown and kept if they are at least that far from all kept before (dart throwing; Cook,
+    1986), until hardly a gap is left that could hold another. Distances are straight through space,
+    so both sides of a thin sheet share their points' room.
 
     Args:
         mesh: of positive area.
