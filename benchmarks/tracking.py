@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.framework import Contender, Results, Samples
 
-TITLE = "Tracking a moving bottle, 640x480 depth images at 30 Hz, one thread"
+TITLE = "Tracking a moving bottle, 640x480 depth images at 30 Hz, processor time"
 FRAMES = 40
 DT = 1 / 30
 FOCAL = 610.0
@@ -169,9 +169,9 @@ def ours(folder: Path) -> Results:
         for k, depth in enumerate(images, 1):
             # Where the hand is, its joints tell.
             occluders = [(hand, RigidTransform(poses[k]))] if scene == "in a hand" else []
-            start = time.perf_counter()
+            start = time.process_time()
             state = track_object(body, state, k * DT, DepthView(depth, camera), occluders=occluders)
-            found.append((time.perf_counter() - start, state.X_WO.GetAsMatrix4()))
+            found.append((time.process_time() - start, state.X_WO.GetAsMatrix4()))
         return found
 
     return _results(folder, track)
@@ -179,7 +179,12 @@ def ours(folder: Path) -> Results:
 
 def _near(depth: Any, X_WC: Any, X_WO: Any, low: Any, high: Any) -> Any:
     """The image's points in W that lie in the box around the object's last pose."""
-    v, u = np.nonzero(depth > 0)
+    corners = np.stack(np.meshgrid(*np.stack([low - MARGIN, high + MARGIN], 1)), -1).reshape(-1, 3)
+    seen = (corners @ X_WO[:3, :3].T + X_WO[:3, 3] - X_WC[:3, 3]) @ X_WC[:3, :3]
+    pixels = np.clip(FOCAL * seen[:, :2] / seen[:, 2:] + [319.5, 239.5], 0, 640).astype(int)
+    (u0, v0), (u1, v1) = pixels.min(axis=0), pixels.max(axis=0) + 1
+    v, u = np.nonzero(depth[v0:v1, u0:u1] > 0)
+    v, u = v + v0, u + u0
     z = depth[v, u].astype(float)
     p_C = np.stack([(u - 319.5) / FOCAL * z, (v - 239.5) / FOCAL * z, z], axis=1)
     p_W = p_C @ X_WC[:3, :3].T + X_WC[:3, 3]
@@ -200,11 +205,11 @@ def _by_registration(folder: Path, register: Callable[[Any, Any], Any]) -> Resul
     def track(_: str, images: Any) -> list[tuple[float, Any]]:
         X_WO, found = poses[0], []
         for depth in images:
-            start = time.perf_counter()
+            start = time.process_time()
             points = _near(depth, X_WC, X_WO, low, high)
             if len(points) > 50:
                 X_WO = register(points, X_WO)
-            found.append((time.perf_counter() - start, X_WO))
+            found.append((time.process_time() - start, X_WO))
         return found
 
     return _results(folder, track)

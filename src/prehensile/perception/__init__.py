@@ -1,9 +1,18 @@
 """From images to clouds: unprojection, normals, cropping, fusion, segmentation."""
 
+from prehensile.perception.articulated_tracking import (
+    ArmState,
+    ArmTrackerConfig,
+    start_arm_tracking,
+    track_arm,
+)
+from prehensile.perception.body_evidence import Body, EvidenceConfig
 from prehensile.perception.camera_model import CameraModel, Distortion, PosedCamera
 from prehensile.perception.cloud import Box, PointCloud, crop, inside_box, inside_half_space, merge
+from prehensile.perception.constrained_refinement import refine_constrained
 from prehensile.perception.depth import DepthConfig, normals_from_depth, unproject
 from prehensile.perception.depth_noise import DepthNoiseConfig, add_depth_noise
+from prehensile.perception.free_space import DepthView, free_space_violation
 from prehensile.perception.fusion import downsample, fuse
 from prehensile.perception.mesh import TriangleMesh, merge_meshes
 from prehensile.perception.mesh_file import read_mesh
@@ -16,15 +25,30 @@ from prehensile.perception.sampling import (
     sample_mesh_uniform,
 )
 from prehensile.perception.segmentation import convex_segments, resting_pairs
+from prehensile.perception.tracking import (
+    ObjectState,
+    TrackerConfig,
+    TrackingStatus,
+    start_tracking,
+    track_object,
+)
 
 __all__ = [
+    "ArmState",
+    "ArmTrackerConfig",
+    "Body",
     "Box",
     "CameraModel",
     "DepthConfig",
     "DepthNoiseConfig",
+    "DepthView",
     "Distortion",
+    "EvidenceConfig",
+    "ObjectState",
     "PointCloud",
     "PosedCamera",
+    "TrackerConfig",
+    "TrackingStatus",
     "TriangleMesh",
     "add_depth_noise",
     "convex_segments",
@@ -32,6 +56,7 @@ __all__ = [
     "downsample",
     "estimate_normals",
     "farthest_point_sampling",
+    "free_space_violation",
     "fuse",
     "inside_box",
     "inside_half_space",
@@ -42,10 +67,15 @@ __all__ = [
     "orient_normals",
     "radius_outliers",
     "read_mesh",
+    "refine_constrained",
     "resting_pairs",
     "sample_mesh_poisson_disc",
     "sample_mesh_uniform",
+    "start_arm_tracking",
+    "start_tracking",
     "statistical_outliers",
     "surface_variation",
+    "track_arm",
+    "track_object",
     "unproject",
 ]
