@@ -19,6 +19,9 @@ using internal::Pose;
 using internal::Require;
 
 constexpr double kPi = 3.14159265358979323846;
+/// Translations of one box of turns are searched to this part of the gap, or of what the box may
+/// still gain, if that is more: then it is split anyway.
+constexpr double kInnerGap = 0.5;
 
 /// Exact nearest neighbours: for each cell of a grid the points that can be nearest to a place
 /// within it. Beyond the grid a tree answers.
@@ -97,12 +100,16 @@ class NearestGrid {
   std::vector<double> candidates_;
 };
 
-/// A cube, and a lower bound of the cost within it. The heap gives the smallest bound first.
+/// A cube, a lower bound of the cost within it, and the cost that its centre gets. The heap gives
+/// the smallest bound first, of equal ones (often zero) the one of least cost.
 struct Cube {
   Eigen::Vector3d center;
   double half;
   double bound;
-  bool operator<(const Cube& other) const { return bound > other.bound; }
+  double cost;
+  bool operator<(const Cube& other) const {
+    return bound != other.bound ? bound > other.bound : cost > other.cost;
+  }
 };
 
 class Search {
@@ -124,15 +131,14 @@ class Search {
     place_extent_ = (upper - lower) / 2;
     if (!all_count) place_extent_.array() += radius + options.max_distance;
     places_.half = place_extent_.maxCoeff();
-    places_.bound = 0;
+    places_.bound = places_.cost = 0;
   }
 
   BranchAndBoundPose Run() {
     const auto start = std::chrono::steady_clock::now();
-    best_.p = places_.center;
-    Improve(best_);
+    Guess();
     std::priority_queue<Cube> queue;
-    queue.push({Eigen::Vector3d::Zero(), kPi, 0});
+    queue.push({Eigen::Vector3d::Zero(), kPi, 0, best_cost_});
     const int dimensions = options_.planar ? 1 : 3;
     BranchAndBoundPose result;
     double lower_bound = best_cost_;
@@ -164,7 +170,7 @@ class Search {
 
  private:
   static Cube Child(const Cube& parent, int child, int dimensions) {
-    Cube cube{parent.center, parent.half / 2, parent.bound};
+    Cube cube{parent.center, parent.half / 2, parent.bound, parent.cost};
     for (int axis = 0; axis < dimensions; ++axis) {
       // In the plane, the only turn is the one about z.
       const int place = dimensions == 1 ? 2 : axis;
@@ -173,42 +179,66 @@ class Search {
     return cube;
   }
 
+  /// Local minima from turns all over, centre on centre: one of them is often the global minimum
+  /// already, and nothing excludes more boxes than that.
+  void Guess() {
+    best_.p = places_.center;
+    const int steps = 8, layers = options_.planar ? 1 : steps;
+    const auto place = [&](int i) { return kPi * ((2 * i + 1.0) / steps - 1); };
+    for (int i = 0; i < layers; ++i) {
+      for (int j = 0; j < layers; ++j) {
+        for (int k = 0; k < steps; ++k) {
+          const Eigen::Vector3d turn(layers > 1 ? place(i) : 0, layers > 1 ? place(j) : 0,
+                                     place(k));
+          if (turn.norm() < kPi) Improve({Rotation(turn), places_.center}, kInfinity);
+        }
+      }
+    }
+  }
+
+  static Eigen::Matrix3d Rotation(const Eigen::Vector3d& turn) {
+    const double angle = turn.norm();
+    if (angle == 0) return Eigen::Matrix3d::Identity();
+    return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+  }
+
   /// Tries the turn in the middle of a cube, and keeps the cube if its bound does not exclude it.
   void Bound(Cube cube, double reach, std::priority_queue<Cube>* queue) {
-    const double angle = cube.center.norm();
-    const Eigen::Matrix3d R = angle > 0
-                                  ? Eigen::AngleAxisd(angle, cube.center / angle).toRotationMatrix()
-                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    const Eigen::Matrix3d R = Rotation(cube.center);
     for (std::size_t i = 0; i < points_.size(); ++i) rotated_[i] = R * points_[i];
 
     // A point moves by no more than this between the middle and any other turn of the cube.
     const double chord = 2 * std::sin(std::min(reach, kPi) / 2);
     for (std::size_t i = 0; i < points_.size(); ++i) slack_[i] = chord * points_[i].norm();
-    cube.bound = std::max(cube.bound, Translations(nullptr));
+    double best = best_cost_;
+    cube.bound = std::max(cube.bound, Translations(&best, nullptr));
     if (best_cost_ - cube.bound <= options_.max_gap) {
       excluded_ = std::min(excluded_, cube.bound);
       return;
     }
     std::fill(slack_.begin(), slack_.end(), 0.0);
     Eigen::Vector3d place = places_.center;
-    Translations(&place);
-    Improve({R, place});
+    cube.cost = best_cost_;
+    Translations(&cube.cost, &place);
+    Improve({R, place}, 2 * best_cost_);
     queue->push(cube);
   }
 
   /// Minimizes the cost over translations, each distance less its point's slack. Returns a lower
-  /// bound of that minimum, or of the best cost so far if that is less, exact to the gap.
+  /// bound of that minimum, or of the best cost so far if that is less.
   ///
-  /// @param place if not null: the translation of least cost found below the best so far.
-  double Translations(Eigen::Vector3d* place) {
+  /// @param least the best cost so far; becomes the least cost found.
+  /// @param place if not null: the translation that has it, if it is less than before.
+  double Translations(double* least, Eigen::Vector3d* place) {
     const int dimensions = options_.planar ? 2 : 3;
     heap_.assign(1, places_);
-    double best = best_cost_;
+    double& best = *least;
     while (!heap_.empty()) {
       std::pop_heap(heap_.begin(), heap_.end());
       const Cube parent = heap_.back();
       heap_.pop_back();
-      if (best - parent.bound <= options_.max_gap) return std::min(parent.bound, best);
+      if (best - parent.bound <= kInnerGap * std::max(options_.max_gap, best_cost_ - best))
+        return std::min(parent.bound, best);
       for (int child = 0; child < 1 << dimensions; ++child) {
         Cube cube = Child(parent, child, dimensions);
         if (!MeetsPlaces(cube)) continue;
@@ -217,12 +247,13 @@ class Search {
         for (std::size_t i = 0; i < rotated_.size() && bound < best; ++i) {
           const double distance = std::sqrt(grid_.Squared(rotated_[i] + cube.center)) - slack_[i];
           const double most = std::clamp(distance, 0.0, options_.max_distance);
-          const double least = std::clamp(distance - reach, 0.0, options_.max_distance);
+          const double under = std::clamp(distance - reach, 0.0, options_.max_distance);
           cost += most * most;
-          bound += least * least;
+          bound += under * under;
         }
         if (bound >= best) continue;  // The sums may be unfinished.
         cube.bound = std::max(bound, parent.bound);
+        cube.cost = cost;
         if (cost < best) {
           best = cost;
           if (place) *place = cube.center;
@@ -239,10 +270,11 @@ class Search {
         .all();
   }
 
-  /// Iterative closest points from a pose, to a local minimum; keeps it if it is the best.
-  void Improve(Pose pose) {
+  /// Iterative closest points from a pose of a cost below `most`, to a local minimum; keeps it if
+  /// it is the best.
+  void Improve(Pose pose, double most) {
     double cost = Cost(pose);
-    if (!(cost < 2 * best_cost_)) return;
+    if (!(cost < most)) return;
     for (int turn = 0; turn < 100; ++turn) {
       if (cost < best_cost_) {
         best_cost_ = cost;

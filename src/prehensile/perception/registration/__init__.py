@@ -4,6 +4,10 @@ from prehensile.perception.registration.branch_and_bound import (
     BranchAndBoundResult,
     branch_and_bound,
 )
+from prehensile.perception.registration.certificate import (
+    RotationCertificate,
+    certify_rotation,
+)
 from prehensile.perception.registration.consistency import (
     Clique,
     ConsistencyGraph,
@@ -98,9 +102,11 @@ __all__ = [
     "RigidFit",
     "RobustConfig",
     "RobustLoss",
+    "RotationCertificate",
     "RotationEstimate",
     "Vote",
     "branch_and_bound",
+    "certify_rotation",
     "coherent_point_drift",
     "consistency_graph",
     "estimate_pose_nonlinear",
