@@ -27,6 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_seed(pick_place)
     _add_common(pick_place)
     pick_place.set_defaults(start=_pick_place)
+    pose_pick = demos.add_parser(
+        "pose-pick", help="an arm finds a known bottle in a bin and sets it upright in another"
+    )
+    pose_pick.add_argument(
+        "--trials", type=int, default=1, help="how many, with SEED, SEED + 1, ... (default 1)"
+    )
+    _add_seed(pose_pick)
+    _add_common(pose_pick)
+    pose_pick.set_defaults(start=_pose_pick)
     arms = demos.add_parser("arms", help="every arm of the gallery holds still and follows")
     arms.add_argument(
         "--controller", choices=_CONTROLLERS, default=_CONTROLLERS[0],
@@ -111,6 +120,23 @@ def _pick_place(args: argparse.Namespace) -> int:
     if report.interrupted:
         return 130
     return 0 if report.success else 1
+
+
+def _pose_pick(args: argparse.Namespace) -> int:
+    _check_seed(args.seed)
+    if args.trials < 1:
+        raise InputError(Finding("must be at least 1", key="--trials"))
+    from prehensile.cli.demo_pose_pick import run_demo
+
+    reports = run_demo(
+        seed=args.seed,
+        trials=args.trials,
+        browser=not args.no_browser,
+        out=args.out or Path("prehensile-out/pose-pick"),
+    )
+    if reports[-1].interrupted:
+        return 130
+    return 0 if all(report.placed for report in reports) else 1
 
 
 def _arms(args: argparse.Namespace) -> int:

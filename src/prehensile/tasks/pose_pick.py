@@ -31,10 +31,12 @@ class Sight:
     Attributes:
         X_WO: pose of the object; None if it was not found.
         reason: why it was not found, or why not to believe it, in words ("" if all is well).
+        seconds: wall seconds from the images to this.
     """
 
     X_WO: RigidTransform | None
     reason: str = ""
+    seconds: float = 0.0
 
 
 class Finder(Protocol):
@@ -94,11 +96,17 @@ class KnownShape:
 
 @dc.dataclass(frozen=True)
 class Look:
-    """One look: when, what it told, and the wall seconds of perception and planning."""
+    """One look.
+
+    Attributes:
+        time: when, in simulated seconds.
+        sight: what it told.
+        plan_wall: wall seconds of planning what to do about it.
+        plan: that, in words.
+    """
 
     time: float
     sight: Sight
-    see_wall: float
     plan_wall: float = 0.0
     plan: str = ""
 
@@ -240,10 +248,9 @@ class PosePick:
         config = self.config
         if memory.attempts >= config.max_attempts:
             return self._done(memory, f"gave up after {memory.attempts} attempts")
-        started = time.perf_counter()
         sight = self._finder.find(senses)
         seen = time.perf_counter()
-        look = Look(now, sight, seen - started)
+        look = Look(now, sight)
         if sight.X_WO is None or sight.reason:
             memory = dc.replace(memory, looks=(*memory.looks, look), blind=memory.blind + 1)
             if memory.blind >= config.max_looks:
@@ -267,7 +274,11 @@ class PosePick:
         if plan.transfer is None:
             center = self._pick_bin.X_WB.translation().copy()
             center[2] = self._pick_bin.floor_height + config.release_height
-            lying = list(lying_poses(center, float(self._shape.half_extent[0]), rng))
+            lying = [
+                X
+                for X in lying_poses(center, float(self._shape.half_extent[0]), rng)
+                if self._planner.has_grasp(X, self._goals)
+            ]
             plan = self._planner.plan(memory.q, X_WO, lying, rng, avoid=memory.avoid)
             what, to_goal = f"laid down first: {reason}", False
         transfer = plan.transfer
@@ -318,9 +329,8 @@ class PosePick:
     def _check(self, memory: Memory, now: float, senses: Senses) -> Decision:
         """Looks whether the object stands where it should."""
         config = self.config
-        started = time.perf_counter()
         sight = self._finder.check(senses, self._X_WGoal)
-        look = Look(now, sight, time.perf_counter() - started, plan="check")
+        look = Look(now, sight, plan="check")
         memory = dc.replace(memory, looks=(*memory.looks, look))
         if sight.X_WO is not None:
             distance, tilt = placement_error(sight.X_WO, self._X_WGoal)

@@ -1,7 +1,8 @@
 """Finding a known object by depth cameras: the bin is subtracted, what is left is registered."""
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -82,8 +83,10 @@ class CameraFinder:
     def find(self, senses: Senses) -> Sight:
         """Where the object is in the first bin; see :class:`prehensile.tasks.pose_pick.Finder`."""
         views = self._views(senses, self._find_cameras)
+        started = time.perf_counter()
         cloud = object_cloud(views, self._pick_bin, self.config)
-        return self.sight(cloud, views)
+        sight = self.sight(cloud, views)
+        return replace(sight, seconds=time.perf_counter() - started)
 
     def sight(self, cloud: PointCloud, views: Sequence[DepthView]) -> Sight:
         """The pose of the object in what was segmented, and whether to believe it."""
@@ -97,13 +100,14 @@ class CameraFinder:
     def check(self, senses: Senses, X_WGuess: RigidTransform) -> Sight:
         """Where the object is in the second bin, near a guess."""
         views = self._views(senses, self._check_cameras)
+        started = time.perf_counter()
         cloud = object_cloud(views, self._place_bin, self.config)
         if len(cloud) < self.config.min_points:
             return Sight(None, f"{len(cloud)} points are in the second bin")
         result = refine_pose(cloud, self._known.field, X_WGuess, self.config.refine)
         if result.X_WO is None or not result.succeeded:
             return Sight(None, f"{result.status.value}: {result.message}")
-        return Sight(result.X_WO)
+        return Sight(result.X_WO, seconds=time.perf_counter() - started)
 
     def _views(self, senses: Senses, names: Sequence[str]) -> list[DepthView]:
         return [
@@ -137,9 +141,10 @@ def believed(result: LocateResult, symmetries: Sequence[RotationMatrix]) -> bool
     if result.status is not RegistrationStatus.AMBIGUOUS:
         return result.succeeded
     assert result.X_WO is not None
+    X_OW = result.X_WO.inverse()
 
     def same(X_WOther: RigidTransform) -> bool:
-        X_OOther = result.X_WO.inverse() @ X_WOther
+        X_OOther = X_OW @ X_WOther
         return any(
             (X_OOther.rotation().inverse() @ R).ToAngleAxis().angle() < 0.15
             and np.linalg.norm(X_OOther.translation()) < 0.01

@@ -14,6 +14,7 @@ from prehensile.grasping.grasp import GraspConfig, GraspStatus
 from prehensile.grasping.gripper import ParallelGripper
 from prehensile.grasping.scoring import evaluate
 from prehensile.perception.cloud import PointCloud
+from prehensile.perception.fusion import downsample
 
 _VOXEL = 0.004
 _TURN = np.deg2rad(15)  # between neighbouring approaches about one closing axis
@@ -118,7 +119,7 @@ def model_grasps(
     ]
 
 
-def collision_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> PointCloud:
+def surface_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> PointCloud:
     """A surface as points with normals, one per voxel of 4 mm.
 
     Args:
@@ -128,7 +129,8 @@ def collision_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> 
     corners = vertices[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1)
-    faces, corners, cross, area = (a[area > 1e-12] for a in (faces, corners, cross, area))
+    wide = area > 1e-12
+    corners, cross, area = corners[wide], cross[wide], area[wide]
     rng = np.random.default_rng(0)
     count = int(area.sum() / _VOXEL**2 * 20)
     face = rng.choice(len(area), size=count, p=area / area.sum())
@@ -138,6 +140,4 @@ def collision_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> 
     a, b, c = (corners[face, k] for k in range(3))
     points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
     normals = cross[face] / (2 * area[face, None])
-    from prehensile.perception.fusion import downsample
-
     return downsample(PointCloud(points, normals), _VOXEL)

@@ -170,6 +170,34 @@ class TransferPlanner:
         worst = sorted(rejected.items(), key=lambda item: -item[1])[:3]
         return TransferPlan(None, "; ".join(f"{reason} ({n} grasps)" for reason, n in worst))
 
+    def has_grasp(
+        self, X_WO: RigidTransform, targets: Sequence[RigidTransform], *, most: int = 40
+    ) -> bool:
+        """Whether some grasp of the object at a pose can also set it down at a target.
+
+        Args:
+            X_WO: where the object would be.
+            targets: where it is to go then.
+            most: grasps that the arm is asked for before the answer is no.
+        """
+        outside = self._outside_walls(X_WO)
+        served_at = np.array([self._outside_walls(X) for X in targets])
+        asked = 0
+        for index in np.nonzero(outside & served_at.any(axis=0))[0]:
+            grasp = self._grasps[index]
+            for flip in (0, 1):
+                X_OG = grasp.X_OG @ X_GFlipped if flip else grasp.X_OG
+                if any(
+                    clear and self._serves(index, flip, X_OG, X)
+                    for X, clear in zip(targets, served_at[:, index], strict=True)
+                ):
+                    asked += 1
+                    if self._free(X_WO @ X_OG, grasp.width, self._arm.q_default):
+                        return True
+                    if asked >= most:
+                        return False
+        return False
+
     def _outside_walls(self, X_WO: RigidTransform) -> NDArray[np.bool_]:
         """For each grasp, whether the hand keeps clear of the bins, with the object at a pose."""
         R_OP = np.array([grasp.X_OG.rotation().matrix() for grasp in self._grasps])

@@ -14,12 +14,12 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.sensors import ImageDepth32F
-from scipy.spatial import cKDTree
 
-from prehensile.behavior.state_machine import Senses, StateMachine
+from prehensile.behavior.state_machine import MachineStatus, Senses, StateMachine
 from prehensile.grasping import WSG50
 from prehensile.models.registry import find_model
 from prehensile.models.shapes.gltf import read_gltf
+from prehensile.native.kd_tree import KdTree
 from prehensile.perception.mesh import TriangleMesh
 from prehensile.perception.registration.known_object import KnownObject
 from prehensile.planning.arm import ArmModel
@@ -31,7 +31,7 @@ from prehensile.station.scenario_file import load_scenario
 from prehensile.tasks.clear_bin_run import bin_geometry, intrinsics
 from prehensile.tasks.pose_pick import Finder, KnownShape, Look, Memory, PosePick, Sight
 from prehensile.tasks.pose_pick_finder import CameraFinder
-from prehensile.tasks.pose_pick_grasps import collision_cloud, model_grasps
+from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_moves import TransferPlanner
 from prehensile.tasks.pose_pick_scene import random_rest_pose
 
@@ -80,7 +80,7 @@ class SeenPose:
         reason: why nothing was believed ("" if it was).
         adds: mean distance of the model's points to those of the true object (ADD-S) [m]; NaN if
             there was no pose.
-        see_wall: wall seconds of perception.
+        see_wall: wall seconds of perception, from the images to the pose.
         plan_wall: wall seconds of planning.
     """
 
@@ -209,6 +209,7 @@ class PosePickRun:
     Attributes:
         start: the object as it lies at the start.
         diagram: the station and the state machine.
+        cameras: intrinsic matrices K (3, 3) of the cameras over the first bin, by name.
     """
 
     def __init__(
@@ -249,7 +250,7 @@ class PosePickRun:
         self._plant = plant
         self._body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName(placed.name))
 
-        cloud_O = collision_cloud(vertices, faces)
+        cloud_O = surface_cloud(vertices, faces)
         p_OCm = self._body.default_com()
         p_WGoal = place_bin.X_WB.translation().copy()
         p_WGoal[2] = place_bin.floor_height - vertices[:, 2].min()
@@ -269,6 +270,7 @@ class PosePickRun:
                 known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries
             )
         task = PosePick(arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed)
+        self.cameras = {name: intrinsics(scenario.cameras[name]).K for name in _FIND}
         names = list(scenario.cameras)
         inputs = {f"{name}.depth_image": AbstractValue.Make(ImageDepth32F()) for name in names}
         inputs |= {f"{name}.X_WC": AbstractValue.Make(RigidTransform()) for name in names}
@@ -334,7 +336,20 @@ class PosePickRun:
         """Name of the state that the task is in."""
         return self._status().decision.state
 
-    def _status(self):
+    @property
+    def phases(self) -> tuple[tuple[float, str], ...]:
+        """(time, state) of all states up to now."""
+        return self._status().history
+
+    @property
+    def found_points(self) -> NDArray[np.float64] | None:
+        """(N, 3) the object's surface where the last look that found it says it is, in W."""
+        for look in reversed(self.memory.looks):
+            if look.sight.X_WO is not None:
+                return look.sight.X_WO.multiply(self._model_points.T).T
+        return None
+
+    def _status(self) -> MachineStatus:
         context = self._machine.GetMyContextFromRoot(self.simulator.get_context())
         return self._machine.status(context)
 
@@ -347,7 +362,7 @@ class PosePickRun:
         error = math.nan
         if sight.X_WO is not None:
             error = adds(self._model_points, X_WO, sight.X_WO)
-        return SeenPose(look.time, look.plan, sight.reason, error, look.see_wall, look.plan_wall)
+        return SeenPose(look.time, look.plan, sight.reason, error, sight.seconds, look.plan_wall)
 
     def report(self, *, interrupted: bool = False) -> PosePickReport:
         """What has come of it up to now."""
@@ -370,7 +385,7 @@ class PosePickRun:
             accepted=memory.placed,
             failures=memory.failures,
             looks=tuple(self._seen),
-            phases=self._status().history,
+            phases=self.phases,
             attempts=memory.attempts,
             distance=float(np.linalg.norm(offset)),
             tilt=float(np.arccos(np.clip(R[2, 2], -1.0, 1.0))),
@@ -390,5 +405,6 @@ def adds(
 
     The measure ADD-S of Hinterstoisser et al. (ACCV 2012), for which symmetric poses are the same.
     """
-    tree = cKDTree(X_WO.multiply(points_O.T).T)
-    return float(tree.query(X_WOEstimated.multiply(points_O.T).T)[0].mean())
+    tree = KdTree(X_WO.multiply(points_O.T).T)
+    _, distances = tree.nearest(X_WOEstimated.multiply(points_O.T).T)
+    return float(distances.mean())
