@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from prehensile.native.kd_tree import KdTree
 from prehensile.native.surface import MeshSurface
+from prehensile.native.voxel_hash import VoxelHash
 
 
 def brute_force(points, query, k):
@@ -292,3 +293,35 @@ def test_bad_surfaces_are_named():
             MeshSurface(*bad)
     with pytest.raises(ValueError, match="queries"):
         MeshSurface(vertices, triangles).nearest([[np.inf, 0, 0]])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.3, 1.0, 5.0]), st.booleans())
+def test_voxel_hash_agrees_with_the_tree(seed, max_distance, on_lattice):
+    rng = np.random.default_rng(seed)
+    points, queries = rng.uniform(-2, 2, (200, 3)), rng.uniform(-3, 3, (100, 3))
+    if on_lattice:  # Points and queries on the voxels' faces, and many ties.
+        points, queries = np.round(points / 0.5) * 0.5, np.round(queries / 0.5) * 0.5
+    voxels = VoxelHash(max_distance)
+    voxels.insert(points[:120])
+    voxels.insert(points[120:])
+    assert len(voxels) == 200
+    indices, distances = voxels.nearest(queries)
+    expected, expected_distances = KdTree(points).nearest(queries, 1, max_distance)
+    np.testing.assert_array_equal(indices, expected[:, 0])
+    np.testing.assert_array_equal(distances, expected_distances[:, 0])
+
+
+def test_voxel_hash_names_bad_arguments():
+    for distance in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="max_distance"):
+            VoxelHash(distance)
+    voxels = VoxelHash(1.0)
+    assert voxels.nearest([[0.0, 0, 0]])[0].tolist() == [-1]
+    for bad in ([[0, 0, np.nan]], [[0, 0, 0], [2e6, 0, 0]], [0, 0, 0]):
+        with pytest.raises(ValueError, match="points"):
+            voxels.insert(bad)
+    assert len(voxels) == 0
+    assert voxels.nearest([[1e300, 0, 0]])[0].tolist() == [-1]
+    with pytest.raises(ValueError, match="queries"):
+        voxels.nearest([[0, 0, np.inf]])

@@ -7,6 +7,7 @@
 
 #include "bindings.h"
 #include "numpy_arrays.h"
+#include "prehensile/voxel_hash.h"
 
 namespace nb = nanobind;
 using nb::literals::operator""_a;
@@ -59,6 +60,23 @@ nb::tuple WithinRadius(const KdTree& tree, nb::handle queries_argument, double r
   return nb::make_tuple(counts.Take(), indices.Take(), distances.Take());
 }
 
+nb::tuple NearestInVoxels(const VoxelHash& voxels, nb::handle queries_argument, int num_threads) {
+  const ArrayArgument queries(queries_argument, "queries");
+  queries.RequireShape({-1, 3});
+  queries.RequireFinite();
+  const std::size_t m = queries.shape(0);
+  ArrayResult<std::int32_t> indices{m};
+  ArrayResult<> distances{m};
+  std::int32_t* const index = indices.data();
+  double* const distance = distances.data();
+  {
+    const nb::gil_scoped_release release;
+    voxels.NearestBatch(queries.data(), m, num_threads, index, distance);
+    std::transform(distance, distance + m, distance, [](double d) { return std::sqrt(d); });
+  }
+  return nb::make_tuple(indices.Take(), distances.Take());
+}
+
 }  // namespace
 
 void BindKdTree(nb::module_& m) {
@@ -75,6 +93,19 @@ void BindKdTree(nb::module_& m) {
       .def("__len__", &KdTree::size)
       .def("nearest", &Nearest, "queries"_a, "k"_a, "max_distance"_a, "num_threads"_a)
       .def("within_radius", &WithinRadius, "queries"_a, "radius"_a, "num_threads"_a);
+  nb::class_<VoxelHash>(m, "VoxelHash")
+      .def(nb::init<double>(), "max_distance"_a)
+      .def("__len__", &VoxelHash::size)
+      .def(
+          "insert",
+          [](VoxelHash& self, nb::handle points_argument) {
+            // With the GIL: nobody may query meanwhile.
+            const ArrayArgument points(points_argument, "points");
+            points.RequireShape({-1, 3});
+            self.Insert(points.data(), points.shape(0));
+          },
+          "points"_a)
+      .def("nearest", &NearestInVoxels, "queries"_a, "num_threads"_a);
 }
 
 }  // namespace prehensile
