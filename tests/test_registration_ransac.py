@@ -53,8 +53,12 @@ def test_seed_decides():
     assert (poses[0] is None) == (poses[1] is None)
     if poses[0] is not None:
         assert np.array_equal(poses[0].GetAsMatrix4(), poses[1].GetAsMatrix4())
-    iterations = {ransac_pose(model, scene, 0.005, seed=seed).iterations for seed in range(5)}
-    assert len(iterations) > 1 or iterations == {100_000}
+    # So few samples hold a right triple by luck only.
+    lucky = {
+        ransac_pose(model, scene, 0.005, seed=seed, max_samples=100).X_WO is None
+        for seed in range(12)
+    }
+    assert lucky == {True, False}
 
 
 def test_noise_is_no_consensus():
@@ -79,7 +83,7 @@ def test_bad_input_is_named():
     for arguments, name in [
         ({"scene_points": good[:4]}, "scene_points"),
         ({"model_points": good * np.inf}, "model_points"),
-        ({"max_distance": -1}, "noise_bound"),
+        ({"max_distance": -1}, "max_distance"),
         ({"max_samples": 0}, "max_samples"),
         ({"confidence": 1.0}, "confidence"),
     ]:

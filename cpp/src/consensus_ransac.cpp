@@ -34,6 +34,8 @@ double SamplesNeeded(int inliers, int n, double confidence) {
 
 RansacPose RansacRegistration(const PointRows& a, const PointRows& b, double max_distance,
                               const RansacOptions& options) {
+  internal::Require(max_distance > 0 && std::isfinite(max_distance),
+                    "max_distance: must be positive and finite");
   internal::RequireCorrespondences(a, b, max_distance);
   internal::Require(options.max_samples >= 1, "max_samples: must be at least 1");
   internal::Require(options.confidence > 0 && options.confidence < 1,
