@@ -6,6 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from depth_scene import boxes_mesh, d415, look_at, render_depth
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +22,7 @@ from prehensile.perception.tracking import (
     start_tracking,
     track_object,
 )
+from prehensile.perception.turns import rotation_of, rotation_vector
 
 CAMERA = d415(look_at((0.6, -0.3, 0.5), (0, 0, 0.1)))
 DT = 1 / 30
@@ -221,3 +224,13 @@ def test_bad_input_is_named(hammer):
         Body(hammer.field, hammer.points, hammer.normals[:5])
     with pytest.raises(ValueError, match="points"):
         Body(hammer.field, hammer.points[:, :2], hammer.normals)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0, 3.1))
+def test_rotation_vectors_are_those_of_scipy(seed, angle):
+    axis = np.random.default_rng(seed).normal(size=3)
+    vector = angle * axis / np.linalg.norm(axis)
+    R = rotation_of(vector)
+    np.testing.assert_allclose(R, Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(rotation_vector(R), vector, atol=1e-9)

@@ -12,11 +12,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
-from scipy.spatial.transform import Rotation
 
 from prehensile.perception.body_evidence import Body, BodyEvidence, Evidence, EvidenceConfig
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.free_space import DepthView
+from prehensile.perception.turns import rotation_of, rotation_vector
 
 Array = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ def _corrected(
             break
         scale = data.loss_scale(iterations - 1, gate)
         here = data.at(points, _matrix(R, p), scale)
-        offset = np.concatenate([Rotation.from_matrix(R @ R_0.T).as_rotvec(), p - p_0])
+        offset = np.concatenate([rotation_vector(R @ R_0.T), p - p_0])
         step = -np.linalg.solve(prior + here.information[0], here.gradient[0] + prior @ offset)
         R, p = _moved(R, p, step)
         settled = scale == config.evidence.loss_scale
@@ -223,9 +223,7 @@ def _updated(
     """Pose as found; velocity and covariances by what they have in common with the pose."""
     P = predicted.covariance
     R_0 = predicted.X_WO.rotation().matrix()
-    offset = np.concatenate(
-        [Rotation.from_matrix(R @ R_0.T).as_rotvec(), p - predicted.X_WO.translation()]
-    )
+    offset = np.concatenate([rotation_vector(R @ R_0.T), p - predicted.X_WO.translation()])
     gain = np.linalg.solve(P[:6, :6], P[:6, 6:]).T  # velocity by pose
     updated = np.zeros((12, 12))
     updated[:6, :6] = covariance
@@ -245,7 +243,7 @@ def _updated(
 
 
 def _moved(R: Array, p: Array, motion: Array) -> tuple[Array, Array]:
-    return Rotation.from_rotvec(motion[:3]).as_matrix() @ R, p + motion[3:]
+    return rotation_of(motion[:3]) @ R, p + motion[3:]
 
 
 def _pose(R: Array, p: Array) -> RigidTransform:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.spatial.transform import Rotation
+
+from prehensile.perception.turns import rotation_of
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ class Minimum:
 
 def moved(R: Array, p: Array, motion: Array) -> tuple[Array, Array]:
     """The pose (R, p) after a motion [w; v] of W: exp(w) R and p + v."""
-    return Rotation.from_rotvec(motion[:3]).as_matrix() @ R, p + motion[3:]
+    return rotation_of(motion[:3]) @ R, p + motion[3:]
 
 
 def nearest_in_polyhedron(point: Array, A: Array, c: Array) -> tuple[Array, Array] | None:
