@@ -44,9 +44,7 @@ def test_rotation_agrees_with_scipy(seed):
     model, scene = rng.normal(size=(2, 10, 3))
     w = rng.uniform(0.1, 2, 10)
     expected, _ = Rotation.align_vectors(scene, model, weights=w)
-    np.testing.assert_allclose(
-        fit_rotation(model, scene, w).R_WO, expected.as_matrix(), atol=1e-7
-    )
+    np.testing.assert_allclose(fit_rotation(model, scene, w).R_WO, expected.as_matrix(), atol=1e-7)
 
 
 @given(seed=SEEDS)
