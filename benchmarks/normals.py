@@ -20,12 +20,12 @@ REPEATS = 5
 
 def prepare(folder: Path) -> None:
     """Writes the points (N, 3) and, for every 300th, the exact normal within the radius."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     voxel.prepare(folder)
     points = _load(folder)
     rows = np.arange(0, len(points), 300)
-    near = cKDTree(points).query_ball_point(points[rows], RADIUS)
+    near = KDTree(points).query_ball_point(points[rows], RADIUS)
     normals = [np.linalg.eigh(np.cov(points[row].T))[1][:, 0] for row in near]
     np.savez(folder / "exact.npz", rows=rows, normals=normals)
 
