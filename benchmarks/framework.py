@@ -140,7 +140,9 @@ def summarize(module: ModuleType, results: dict[str, list[Results]]) -> list[Row
                 ratios = [theirs / statistics.median(mine[case].values) for theirs, mine in pairs]
                 if ratios:
                     middle = statistics.median(ratios)
-                    ratio = 1 / middle if first.more_is_better else middle
+                    if first.more_is_better:
+                        middle = 1 / middle if middle else float("inf")
+                    ratio = middle
             middle = statistics.median(medians)
             rows.append(Row(case, contender, first.unit, middle, min(medians), max(medians), ratio))
     return rows

@@ -37,7 +37,7 @@ def _sampled_minimum(scene, model, max_distance, rng):
     )
     places = rng.uniform(model.min(axis=0), model.max(axis=0), (count, dimension))
     starts = np.concatenate([turns, places], axis=1)
-    starts = starts[np.argsort([cost(v) for v in starts])[:25]]
+    starts = starts[np.argsort([cost(v) for v in starts])[:10]]
     options = {"maxfev": 400, "xatol": 1e-6, "fatol": 1e-9}
     return min(minimize(cost, v, method="Nelder-Mead", options=options).fun for v in starts)
 
