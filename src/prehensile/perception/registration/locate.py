@@ -17,7 +17,6 @@ from prehensile.perception.registration.evidence import (
     Evidence,
     EvidenceConfig,
     in_object,
-    violation,
     weigh,
 )
 from prehensile.perception.registration.known_object import KnownObject
@@ -31,7 +30,7 @@ class LocateConfig(EvidenceConfig):
 
     Attributes:
         num_references: points of the scene that vote for poses, at least 1; more for scenes with
-            much else in them.
+            much else in them. (More do in small scenes.)
         max_candidates: poses from the vote that are refined, at least 1.
         max_finalists: of those, poses apart from each other that are refined on all points.
         min_coverage: part of the object's surface towards the sensor that must be seen where the
@@ -43,12 +42,12 @@ class LocateConfig(EvidenceConfig):
         ambiguity: the best pose must fit better than any other by so many standard errors.
     """
 
-    num_references: int = 25
-    max_candidates: int = 20
-    max_finalists: int = 4
+    num_references: int = 30
+    max_candidates: int = 50
+    max_finalists: int = 5
     min_coverage: float = 0.35
     min_agreement: float = 0.35
-    min_score: float = 0.55
+    min_score: float = 0.6
     max_violation: float = 0.1
     ambiguity: float = 3.0
 
@@ -146,8 +145,9 @@ def locate(
         return _nothing(scene, f"the scene has only {len(thinned)} points with normals")
     votes = model.pairs.vote(
         thinned,
-        num_references=config.num_references,
-        peaks_per_reference=4,
+        # Few points vote fast: more of them may.
+        num_references=max(config.num_references, 9000 // len(thinned)),
+        peaks_per_reference=6,
         max_poses=config.max_candidates,
         num_threads=num_threads,
     )
@@ -160,19 +160,28 @@ def locate(
     apart = _apart(coarse, model)[: config.max_finalists]
     starts = np.stack([fit.X_WO for fit in apart])
     fits = _refine(model, points, starts, config, coarse=False, num_threads=num_threads)
-    if looks := _as_tuple(views):
-        squared = _scale(config) ** 2
-        fits.sort(key=lambda fit: fit.cost / squared + violation(model, fit.X_WO, looks, config))
-    # Of poses between which the points do not decide, the evidence beyond the points may.
-    rivals = [fits[0]] + [
+    fits = _apart(fits, model)
+    looks = _as_tuple(views)
+    evidence = {id(fit): weigh(scene, thinned, model, fit.X_WO, looks, config) for fit in fits}
+
+    # A pose must explain the scene, and the scene the pose: a flat piece lies well on any large
+    # flat face. Of poses that do the second alike, the points decide.
+    def unexplained(fit: _Fit) -> float:
+        found = evidence[id(fit)]
+        return fit.cost / _scale(config) ** 2 + (1 - found.coverage) + found.violation
+
+    first = evidence[id(min(fits, key=unexplained))]
+    alike = [
         fit
-        for fit in _apart(fits, model)[1:]
-        if _margin(model, points, fits[0], fit, config) < config.ambiguity
+        for fit in fits
+        if evidence[id(fit)].coverage > first.coverage - 0.1
+        and evidence[id(fit)].violation < first.violation + 0.1
     ]
-    weighed = [(weigh(scene, thinned, model, fit.X_WO, looks, config), fit) for fit in rivals]
-    most = max(evidence.score for evidence, _ in weighed)
-    (evidence, best), *others = [w for w in weighed if w[0].score >= 0.8 * most]
-    return _judged(scene, model, config, best, evidence, [fit for _, fit in others])
+    best = alike[0]
+    others = [
+        fit for fit in alike[1:] if _margin(model, points, best, fit, config) < config.ambiguity
+    ]
+    return _judged(scene, model, config, best, evidence[id(best)], others)
 
 
 def _as_tuple(views: DepthView | Sequence[DepthView]) -> tuple[DepthView, ...]:
