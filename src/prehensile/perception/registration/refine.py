@@ -208,7 +208,7 @@ def _refine(
 
 
 def _result(
-    answer: _core.RefinedPose, config: RefineConfig, mean: NDArray[np.float64], length: float
+    answer: "_core.RefinedPose", config: RefineConfig, mean: NDArray[np.float64], length: float
 ) -> RegistrationResult:
     """Judges one finalist."""
     X, _, coarse, fine, converged, _, information, sum_squares, sum_weights, residuals = answer
@@ -240,7 +240,7 @@ def _result(
 def _is_rival(
     i: int,
     winner: int,
-    answers: Sequence[_core.RefinedPose],
+    answers: "Sequence[_core.RefinedPose]",
     field: DistanceField,
     config: RefineConfig,
 ) -> bool:
