@@ -102,7 +102,7 @@ def _picture(run: PosePickRun, path: Path) -> None:
         picture[depth == 0] = _MISSED
         points = run.found_points
         if points is not None:
-            color = draw_points(color, K, X_WC, points, radius=1)
+            color = draw_points(color, K, X_WC, points[::7], radius=1)
         rows.append(side_by_side([color, picture]))
     save_png(path, np.concatenate(rows))
 

@@ -148,9 +148,9 @@ def _disparity(
     depth: NDArray[np.floating], scale: np.float32, min_depth: float
 ) -> NDArray[np.float32]:
     """(H, W) true disparity [pixels]; 0 for too far, and somewhat too much for too near."""
-    depth = np.array(depth, dtype=np.float32)
-    depth[~(depth > 0)] = 0.5 * min_depth
-    return (scale / depth).astype(np.float32, copy=False)
+    known: NDArray[np.float32] = np.array(depth, dtype=np.float32)
+    known[~(known > 0)] = 0.5 * min_depth
+    return np.reciprocal(known) * scale
 
 
 def _missed_score(

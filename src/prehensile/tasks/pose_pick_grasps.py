@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.grasping.candidates import Candidates
-from prehensile.grasping.grasp import GraspConfig, GraspStatus
+from prehensile.grasping.grasp import GraspConfig
 from prehensile.grasping.gripper import ParallelGripper
 from prehensile.grasping.scoring import evaluate
 from prehensile.perception.cloud import PointCloud
@@ -69,51 +69,57 @@ def model_grasps(
         The grasps, none closer to a better one than 8 mm and 14 degrees.
     """
     rng = np.random.default_rng(seed)
-    normals = cloud_O.require_normals()
     chosen = rng.choice(len(cloud_O), size=min(num_seeds, len(cloud_O)), replace=False)
     turns = np.arange(0, 2 * np.pi - 1e-9, _TURN)
-    axes, points, seeds = [], [], []
-    for k, index in enumerate(chosen):
-        x = normals[index]
-        y0 = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
-        y0 /= np.linalg.norm(y0)
-        z0 = np.cross(x, y0)
-        y = np.cos(turns)[:, None] * y0 + np.sin(turns)[:, None] * z0
-        frame = np.stack([np.broadcast_to(x, y.shape), y, np.cross(x, y)], axis=-1)
-        axes.append(frame)
-        points.append(np.broadcast_to(cloud_O.points[index] - 0.5 * _VOXEL * x, y.shape))
-        seeds.append(np.full(len(turns), k))
-    candidates = Candidates(
-        np.concatenate(axes),
-        np.concatenate(points),
-        np.zeros(len(chosen) * len(turns), dtype=np.int64),
-        np.concatenate(seeds),
-    )
-    segments = np.zeros(len(cloud_O), dtype=np.int64)
-    found = evaluate(candidates, cloud_O, segments, gripper, [], _CONFIG)
-    feasible = np.nonzero(found.status == GraspStatus.FOUND)[0]
-    offset = np.linalg.norm(np.cross(found.p_WP - p_OCm, candidates.R_WP[:, :, 0]), axis=1)
-    score = found.score - _ARM_WEIGHT * offset / 0.05
-    order = feasible[np.argsort(-score[feasible], kind="stable")]
+    x = cloud_O.require_normals()[chosen]
+    y0 = np.cross(x, np.eye(3)[np.argmin(np.abs(x), axis=1)])
+    y0 /= np.linalg.norm(y0, axis=1, keepdims=True)
+    z0 = np.cross(x, y0)
+    y = np.cos(turns)[:, None] * y0[:, None] + np.sin(turns)[:, None] * z0[:, None]
+    x = np.broadcast_to(x[:, None], y.shape)
+    frames = np.stack([x, y, np.cross(x, y)], axis=-1)
+    R_OP: NDArray[np.float64] = frames.astype(float).reshape(-1, 3, 3)
+    p_OP = (cloud_O.points[chosen, None] - 0.5 * _VOXEL * x).reshape(-1, 3)
+    place = np.repeat(np.arange(len(chosen)), len(turns))
+    # Collisions are judged for hands that do not point up: for those that do, upside down.
+    p_found, widths, scores = p_OP.copy(), np.zeros(len(p_OP)), np.full(len(p_OP), -np.inf)
+    for up in (False, True):
+        rows = np.nonzero((R_OP[:, 2, 1] > 0) == up)[0]
+        R_VO = np.diag([1.0, -1.0, -1.0]) if up else np.eye(3)
+        found = evaluate(
+            Candidates(R_VO @ R_OP[rows], p_OP[rows] @ R_VO.T, np.zeros_like(rows), place[rows]),
+            cloud_O.transformed(RigidTransform(RotationMatrix(R_VO), np.zeros(3))),
+            np.zeros(len(cloud_O), dtype=np.int64),
+            gripper,
+            [],
+            _CONFIG,
+        )
+        p_found[rows] = found.p_WP @ R_VO
+        widths[rows] = found.width
+        scores[rows] = found.score  # minus infinity where it is none
+    offset = np.linalg.norm(np.cross(p_found - p_OCm, R_OP[:, :, 0]), axis=1)
+    scores -= _ARM_WEIGHT * offset / 0.05
+    order = np.argsort(-scores, kind="stable")
+    order = order[np.isfinite(scores[order])]
     kept: list[int] = []
     for i in order:
         if not kept:
             kept.append(i)
             continue
-        near = np.linalg.norm(found.p_WP[kept] - found.p_WP[i], axis=1) < 0.008
+        near = np.linalg.norm(p_found[kept] - p_found[i], axis=1) < 0.008
         # Half a turn about the approach exchanges the fingers: the same grasp.
-        d = np.sum(candidates.R_WP[kept] * candidates.R_WP[i], axis=1)
+        d = np.sum(R_OP[kept] * R_OP[i], axis=1)
         trace = d[:, 1] + np.abs(d[:, 0] + d[:, 2])
         if not np.any(near & (0.5 * (trace - 1.0) > np.cos(np.deg2rad(14)))):
             kept.append(i)
     return [
         ModelGrasp(
             RigidTransform(
-                RotationMatrix.ProjectToRotationMatrix(candidates.R_WP[i]),
-                found.p_WP[i] - candidates.R_WP[i] @ gripper.p_GPad,
+                RotationMatrix.ProjectToRotationMatrix(R_OP[i]),
+                p_found[i] - R_OP[i] @ gripper.p_GPad,
             ),
-            float(found.width[i]),
-            float(score[i]),
+            float(widths[i]),
+            float(scores[i]),
         )
         for i in kept
     ]

@@ -183,7 +183,7 @@ class TransferPlanner:
         outside = self._outside_walls(X_WO)
         served_at = np.array([self._outside_walls(X) for X in targets])
         asked = 0
-        for index in np.nonzero(outside & served_at.any(axis=0))[0]:
+        for index in map(int, np.nonzero(outside & served_at.any(axis=0))[0]):
             grasp = self._grasps[index]
             for flip in (0, 1):
                 X_OG = grasp.X_OG @ X_GFlipped if flip else grasp.X_OG
