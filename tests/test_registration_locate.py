@@ -1,5 +1,6 @@
 """Known objects found in rendered views, and not found where they are not."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -60,6 +61,14 @@ MESHES = {
     "brick": _box((0.15, 0.08, 0.05), (0, 0, 0)),
     "can": _cylinder(0.04, 0.12),
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Distance fields are kept with the test's files and not with the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @cache
@@ -205,7 +214,7 @@ def test_same_answer_for_any_number_of_threads_and_with_given_normals() -> None:
 
 
 def test_a_cloud_can_be_the_model() -> None:
-    dense = KnownObject.from_mesh(MESHES["steps"], num_points=1000, field_spacing=0.003).cloud
+    dense = KnownObject.from_mesh(MESHES["steps"], num_points=600, field_spacing=0.003).cloud
     model = KnownObject.from_cloud(dense, field_spacing=0.003)
     X_CO, scene = _views("steps", 1, seed=9)[0]
     result = locate(scene, model)
