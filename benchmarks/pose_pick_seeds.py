@@ -14,7 +14,8 @@ import sys
 from pathlib import Path
 
 from prehensile.files import write_json
-from prehensile.tasks.pose_pick_run import PosePickReport, PosePickRun
+from prehensile.tasks.pose_pick_report import PosePickReport
+from prehensile.tasks.pose_pick_run import PosePickRun
 
 TIME_LIMIT = 180.0  # simulated seconds
 HEAD = ("seed", "start", "pose", "ADD-S mm", "placed", "off mm", "tilt", "tries", "sim s", "ended")

@@ -11,7 +11,9 @@ from prehensile.grasping import WSG50
 from prehensile.models.shapes.primitives import box
 from prehensile.perception.registration.locate import LocateResult
 from prehensile.perception.registration.result import RegistrationStatus
+from prehensile.scenes.clutter import BIN_INTERIOR_MAX, BIN_INTERIOR_MIN
 from prehensile.station.scenario_file import load_scenario
+from prehensile.tasks.clear_bin_moves import BinGeometry
 from prehensile.tasks.pose_pick import (
     KnownShape,
     Memory,
@@ -23,7 +25,14 @@ from prehensile.tasks.pose_pick import (
 from prehensile.tasks.pose_pick_finder import believed
 from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_moves import lying_poses
-from prehensile.tasks.pose_pick_run import MODEL, PosePickRun, adds, load_surface
+from prehensile.tasks.pose_pick_report import adds
+from prehensile.tasks.pose_pick_run import (
+    MODEL,
+    PosePickRun,
+    check_goal,
+    default_goal,
+    load_surface,
+)
 from prehensile.tasks.pose_pick_scene import START_KINDS, random_rest_pose
 
 SIZE = np.array([0.04, 0.07, 0.16])
@@ -212,6 +221,22 @@ def test_it_looks_once_more_if_the_object_is_not_at_its_goal():
     decision = decide(machine, "release", memory)
     assert decision.state == "look"
     assert "0 points" in decision.memory.failures[-1]
+
+
+def test_goals_in_the_air_in_a_wall_or_tilted_are_refused(bottle):
+    X_WB = RigidTransform([0.0, 0.57, 0.0])
+    place_bin = BinGeometry(X_WB, BIN_INTERIOR_MIN, BIN_INTERIOR_MAX, [])
+    vertices, _ = bottle
+    check_goal(default_goal(place_bin, vertices), place_bin, vertices)
+    on_floor = [0.0, 0.57, 0.03 + 0.0955]
+    for X_WGoal in (
+        RigidTransform([0.0, 0.57, 0.2]),
+        RigidTransform([0.0, 0.57 + 0.18, 0.03 + 0.0955]),
+        RigidTransform(RotationMatrix.MakeXRotation(0.3), on_floor),
+        RigidTransform(RotationMatrix.MakeXRotation(np.pi), on_floor),
+    ):
+        with pytest.raises(ValueError, match="X_WGoal"):
+            check_goal(X_WGoal, place_bin, vertices)
 
 
 @pytest.mark.slow

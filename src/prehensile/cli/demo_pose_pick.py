@@ -7,7 +7,8 @@ import numpy as np
 from rich.console import Console
 
 from prehensile.files import write_json
-from prehensile.tasks.pose_pick_run import PosePickReport, PosePickRun
+from prehensile.tasks.pose_pick_report import PosePickReport
+from prehensile.tasks.pose_pick_run import PosePickRun
 from prehensile.viz.images import colorize_depth, draw_points, save_png, side_by_side
 from prehensile.viz.meshcat import start_meshcat
 from prehensile.viz.replay import Recorder, check_writable

@@ -150,7 +150,8 @@ def _disparity(
     """(H, W) true disparity [pixels]; 0 for too far, and somewhat too much for too near."""
     known: NDArray[np.float32] = np.array(depth, dtype=np.float32)
     known[~(known > 0)] = 0.5 * min_depth
-    return np.reciprocal(known) * scale
+    np.divide(scale, known, out=known)
+    return known
 
 
 def _missed_score(

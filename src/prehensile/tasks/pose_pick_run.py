@@ -3,7 +3,6 @@
 import dataclasses as dc
 import math
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from prehensile.behavior.state_machine import MachineStatus, Senses, StateMachin
 from prehensile.grasping import WSG50
 from prehensile.models.registry import find_model
 from prehensile.models.shapes.gltf import read_gltf
-from prehensile.native.kd_tree import KdTree
 from prehensile.perception.mesh import TriangleMesh
 from prehensile.perception.registration.known_object import KnownObject
 from prehensile.planning.arm import ArmModel
@@ -28,20 +26,19 @@ from prehensile.station.build import build
 from prehensile.station.robot_plant import make_robot_diagram
 from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario
+from prehensile.tasks.clear_bin_moves import BinGeometry
 from prehensile.tasks.clear_bin_run import bin_geometry, intrinsics
 from prehensile.tasks.pose_pick import Finder, KnownShape, Look, Memory, PosePick, Sight
 from prehensile.tasks.pose_pick_finder import CameraFinder
 from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_moves import TransferPlanner
+from prehensile.tasks.pose_pick_report import PosePickReport, SeenPose, adds
 from prehensile.tasks.pose_pick_scene import random_rest_pose
 
 MODEL = "mustard_bottle"
 BODY_POSES = "body_poses"
 GRIP_FORCE = 80.0  # N, the most that the hand can
 GOAL_YAW = math.radians(135.0)
-POSE_TOLERANCE = 0.005  # m of ADD-S, within which a pose counts as right
-POSITION_TOLERANCE = 0.02  # m of the bottle's origin from its goal
-UPRIGHT_TOLERANCE = math.radians(5.0)
 _AT_REST = 0.01  # m/s and rad/s
 _FIND, _CHECK = ("camera0", "camera1", "camera2"), ("camera3",)
 _STEP = 0.1  # simulated seconds between two looks at the clock, the display and Ctrl-C
@@ -68,107 +65,6 @@ cameras:
       rotation: !Rpy { deg: [-131.34, 0.0, -144.09] }
     renderer_class: !RenderEngineVtkParams { force_to_pbr: true }
 """
-
-
-@dc.dataclass(frozen=True)
-class SeenPose:
-    """One look, held against the truth.
-
-    Attributes:
-        time: simulated seconds.
-        what: what was done about it: ``to the goal``, ``check``, ...
-        reason: why nothing was believed ("" if it was).
-        adds: mean distance of the model's points to those of the true object (ADD-S) [m]; NaN if
-            there was no pose.
-        see_wall: wall seconds of perception, from the images to the pose.
-        plan_wall: wall seconds of planning.
-    """
-
-    time: float
-    what: str
-    reason: str
-    adds: float
-    see_wall: float
-    plan_wall: float
-
-
-@dc.dataclass(frozen=True)
-class PosePickReport:
-    """Result of a run; what is said of poses and ends is the simulator's truth.
-
-    Attributes:
-        seed: of the scene and of every choice.
-        start: how the object was let go: ``upright``, ``leaning`` or ``fallen``.
-        X_WStart: where it then lay.
-        X_WGoal: where it was to stand.
-        X_WEnd: where it ended.
-        finished: why the run ended, in words.
-        accepted: whether the task's own check accepted the end.
-        failures: what went wrong on the way.
-        looks: every look.
-        phases: (time, state) of the state machine.
-        attempts: how often the object was to be moved.
-        distance: of the origin from the goal at the end [m].
-        tilt: angle to upright at the end [rad].
-        yaw: angle about the vertical from the goal, up to half a turn, by which the shape does not
-            change [rad].
-        at_rest: whether the object was at rest at the end.
-        released: whether the hand was clear of it at the end.
-        sim_time: simulated seconds.
-        wall_time: wall seconds of the simulation with perception and planning.
-        interrupted: the user stopped it.
-    """
-
-    seed: int
-    start: str
-    X_WStart: RigidTransform
-    X_WGoal: RigidTransform
-    X_WEnd: RigidTransform
-    finished: str
-    accepted: bool
-    failures: tuple[str, ...]
-    looks: tuple[SeenPose, ...]
-    phases: tuple[tuple[float, str], ...]
-    attempts: int
-    distance: float
-    tilt: float
-    yaw: float
-    at_rest: bool
-    released: bool
-    sim_time: float
-    wall_time: float
-    interrupted: bool = False
-
-    @property
-    def pose_right(self) -> bool:
-        """Whether the first pose that the task acted on was right: ADD-S under 5 mm."""
-        first = next(
-            (look for look in self.looks if not look.reason and look.what != "check"), None
-        )
-        return first is not None and first.adds < POSE_TOLERANCE
-
-    @property
-    def placed(self) -> bool:
-        """Whether it stands within 2 cm of its goal, upright within 5 degrees, at rest, let go."""
-        stands = self.distance <= POSITION_TOLERANCE and self.tilt <= UPRIGHT_TOLERANCE
-        return stands and self.at_rest and self.released
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as plain JSON values, NaN as null."""
-
-        def plain(value: Any) -> Any:
-            if isinstance(value, RigidTransform):
-                return value.GetAsMatrix4().tolist()
-            if isinstance(value, (list, tuple)):
-                return [plain(item) for item in value]
-            if isinstance(value, SeenPose):
-                return {key: plain(item) for key, item in vars(value).items()}
-            if isinstance(value, float):
-                return value if math.isfinite(value) else None
-            return value
-
-        own = {key: plain(value) for key, value in vars(self).items()}
-        return {"task": "pose-pick", "placed": self.placed, "pose_right": self.pose_right} | own
 
 
 class TrueFinder:
@@ -216,6 +112,7 @@ class PosePickRun:
         self,
         *,
         seed: int,
+        X_WGoal: RigidTransform | None = None,
         cheat: bool = False,
         scenario: Scenario | None = None,
         meshcat: Meshcat | None = None,
@@ -224,12 +121,15 @@ class PosePickRun:
 
         Args:
             seed: of the scene, the cameras' noise and every choice of the task.
+            X_WGoal: upright pose on the floor of ``bin1`` that the object is to have; in the
+                middle, turned by 135 degrees, if None.
             cheat: tell the task the true pose instead of letting it look.
             scenario: a scenario like :func:`load_pose_pick_scenario`'s, which is the default.
             meshcat: where to show it; nothing is shown if None.
 
         Raises:
             InputError: the object does not stay in the bin.
+            ValueError: X_WGoal is not upright on the floor of the second bin.
         """
         scenario = scenario or load_pose_pick_scenario()
         noise = {
@@ -252,9 +152,8 @@ class PosePickRun:
 
         cloud_O = surface_cloud(vertices, faces)
         p_OCm = self._body.default_com()
-        p_WGoal = place_bin.X_WB.translation().copy()
-        p_WGoal[2] = place_bin.floor_height - vertices[:, 2].min()
-        self.X_WGoal = RigidTransform(RotationMatrix.MakeZRotation(GOAL_YAW), p_WGoal)
+        self.X_WGoal = X_WGoal or default_goal(place_bin, vertices)
+        check_goal(self.X_WGoal, place_bin, vertices)
         half_turn = RotationMatrix.MakeZRotation(np.pi)
         half_extent = 0.5 * np.ptp(vertices, axis=0)
         shape = KnownShape(cloud_O, half_extent, [RotationMatrix(), half_turn])
@@ -398,13 +297,30 @@ class PosePickRun:
         )
 
 
-def adds(
-    points_O: NDArray[np.float64], X_WO: RigidTransform, X_WOEstimated: RigidTransform
-) -> float:
-    """Mean distance of points (N, 3) of a model to the nearest of the model where it truly is [m].
+def default_goal(place_bin: BinGeometry, vertices: NDArray[np.float64]) -> RigidTransform:
+    """An upright pose in the middle of a bin, turned so that hands can come from many sides."""
+    p_WGoal = place_bin.X_WB.translation().copy()
+    p_WGoal[2] = place_bin.floor_height - vertices[:, 2].min()
+    return RigidTransform(RotationMatrix.MakeZRotation(GOAL_YAW), p_WGoal)
 
-    The measure ADD-S of Hinterstoisser et al. (ACCV 2012), for which symmetric poses are the same.
+
+def check_goal(
+    X_WGoal: RigidTransform, place_bin: BinGeometry, vertices: NDArray[np.float64]
+) -> None:
+    """Refuses goals in the air, in a wall, or not upright.
+
+    Args:
+        X_WGoal: the goal.
+        place_bin: the bin that it is to be in.
+        vertices: (V, 3) of the object, in O [m].
+
+    Raises:
+        ValueError: saying what is wrong with X_WGoal.
     """
-    tree = KdTree(X_WO.multiply(points_O.T).T)
-    _, distances = tree.nearest(X_WOEstimated.multiply(points_O.T).T)
-    return float(distances.mean())
+    matrix = np.asarray(X_WGoal.GetAsMatrix4(), dtype=float)
+    if not np.isfinite(matrix).all() or matrix[2, 2] < 1.0 - 1e-6:
+        raise ValueError("X_WGoal: must be finite and upright")
+    p_B = (place_bin.X_WB.inverse() @ X_WGoal).multiply(vertices.T).T
+    within = np.all(p_B[:, :2] > place_bin.low[:2]) and np.all(p_B[:, :2] < place_bin.high[:2])
+    if not within or abs(p_B[:, 2].min() - place_bin.low[2]) > 1e-3:
+        raise ValueError("X_WGoal: must be on the floor of the second bin, clear of its walls")
