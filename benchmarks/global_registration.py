@@ -214,18 +214,24 @@ def kiss_matcher(folder: Path) -> Results:
     scale = 100.0  # It refuses voxels of millimetres.
     matcher = kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(scale * VOXEL))
 
+    # It turns normals toward the origin. They are alike in both clouds only where both origins lie
+    # inside the object, so it gets them shifted that way.
     def load(_: str, points: Any, normals: Any) -> Any:
         target = small_gicp.PointCloud(points)
         tree = small_gicp.KdTree(target)
         small_gicp.estimate_normals_covariances(target, tree, 20, 1)
-        return (scale * points).astype(np.float32), target, tree
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        return (scale * (points - middle)).astype(np.float32), middle, target, tree
 
     def solve(model: Any, scene: Any) -> Any:
-        found = matcher.estimate((scale * scene).astype(np.float32), model[0])
+        inside = scene.mean(axis=0)
+        inside *= 1 + 0.04 / np.linalg.norm(inside)
+        found = matcher.estimate((scale * (scene - inside)).astype(np.float32), model[0])
         start = np.eye(4)
-        start[:3, :3], start[:3, 3] = found.rotation, np.ravel(found.translation) / scale
+        start[:3, :3] = found.rotation
+        start[:3, 3] = np.ravel(found.translation) / scale + model[1] - start[:3, :3] @ inside
         answer = small_gicp.align(
-            *(model[1], small_gicp.PointCloud(scene), model[2]),
+            *(model[2], small_gicp.PointCloud(scene), model[3]),
             init_T_target_source=start,
             registration_type="PLANE_ICP",
             max_correspondence_distance=2 * VOXEL,
