@@ -9,10 +9,11 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.sensors import CameraInfo
 
 from prehensile.viz.figures import save_animation, save_figure
 from prehensile.viz.images import project
-from prehensile.viz.render import look_at, render
+from prehensile.viz.render import look_at, render, render_depth
 
 
 @pytest.fixture
@@ -97,3 +98,15 @@ def test_an_animation_holds_every_picture_in_order(tmp_path):
     assert [round(f.mean()) for f in frames] == shades
     with pytest.raises(ValueError, match="pictures"):
         save_animation([], "none", tmp_path)
+
+
+def test_depth_is_that_along_the_optical_axis(scene):
+    diagram, _ = scene
+    context = diagram.CreateDefaultContext()
+    info = CameraInfo(160, 120, 200.0, 200.0, 79.5, 59.5)
+    depth = render_depth(diagram, context, look_at([1.0, 0, 0], [0, 0, 0]), info)
+    # The face toward the camera lies 0.95 m away; half of it is imaged over 10.5 pixels.
+    hit = np.isfinite(depth)
+    np.testing.assert_allclose(depth[hit], 0.95, atol=1e-3)
+    assert 20**2 <= hit.sum() <= 22**2
+    assert np.isinf(depth[0, 0])

@@ -5,8 +5,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import (
     ClippingRange,
     ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
     LightParameter,
     MakeRenderEngineVtk,
+    QueryObject,
     RenderCameraCore,
     RenderEngineVtkParams,
     SceneGraph,
@@ -69,6 +72,51 @@ def render(
     Raises:
         ValueError: the diagram has no SceneGraph.
     """
+    core = RenderCameraCore(
+        _RENDERER, CameraInfo(width, height, fov_y), ClippingRange(0.01, 20.0), RigidTransform()
+    )
+    query = _query(diagram, context)
+    image = query.RenderColorImage(
+        ColorRenderCamera(core, False), query.inspector().world_frame_id(), X_WC
+    )
+    return as_rgb(image.data)
+
+
+def render_depth(
+    diagram: Diagram,
+    context: Context,
+    X_WC: RigidTransform,
+    info: CameraInfo,
+    *,
+    min_depth: float = 0.05,
+    max_depth: float = 10.0,
+) -> NDArray[np.float32]:
+    """Takes an ideal depth image of a diagram's scene as it is in a context.
+
+    Args:
+        diagram: as for :func:`render`.
+        context: as for :func:`render`.
+        X_WC: pose of the camera's optical frame.
+        info: its intrinsics.
+        min_depth, max_depth: range of what is seen [m].
+
+    Returns:
+        (height, width) depth along the optical axis [m]; 0 nearer and infinity farther than the
+        range.
+
+    Raises:
+        ValueError: the diagram has no SceneGraph.
+    """
+    clipping = ClippingRange(0.5 * min_depth, 2 * max_depth)
+    core = RenderCameraCore(_RENDERER, info, clipping, RigidTransform())
+    camera = DepthRenderCamera(core, DepthRange(min_depth, max_depth))
+    query = _query(diagram, context)
+    image = query.RenderDepthImage(camera, query.inspector().world_frame_id(), X_WC)
+    return image.data[:, :, 0].copy()
+
+
+def _query(diagram: Diagram, context: Context) -> QueryObject:
+    """What there is to be seen; a renderer is added to the context the first time."""
     scene_graph = _find_scene_graph(diagram)
     if scene_graph is None:
         raise ValueError("diagram: there is no SceneGraph in it")
@@ -85,14 +133,7 @@ def render(
         scene_graph.AddRenderer(scene_context, _RENDERER, MakeRenderEngineVtk(params))
         # Poses that were computed before are not sent to a new renderer: have them computed anew.
         context.get_mutable_state()
-    core = RenderCameraCore(
-        _RENDERER, CameraInfo(width, height, fov_y), ClippingRange(0.01, 20.0), RigidTransform()
-    )
-    query = scene_graph.get_query_output_port().Eval(scene_context)
-    image = query.RenderColorImage(
-        ColorRenderCamera(core, False), scene_graph.world_frame_id(), X_WC
-    )
-    return as_rgb(image.data)
+    return scene_graph.get_query_output_port().Eval(scene_context)
 
 
 def _find_scene_graph(diagram: Diagram) -> SceneGraph | None:
