@@ -42,3 +42,14 @@ def test_the_arm_of_the_readme_begins_to_move_down(capsys):
     # From rest, within 5 ms.
     acceleration = names["JointLimits"].of_tree(names["arm"]).acceleration
     assert np.all(np.abs(result.v) <= 0.005 * acceleration + 1e-12)
+
+
+def test_the_bottle_of_the_page_on_perception_is_found(capsys):
+    names = run("docs/perception.md")
+    assert names["found"].succeeded or names["found"].alternatives  # Or half a turn from the truth.
+    X_OO = names["X_WBottle"].inverse() @ names["refined"].X_WO
+    assert np.linalg.norm(X_OO.translation()) < 0.002
+    upright = X_OO.rotation().matrix()[2, 2]
+    assert upright > np.cos(np.deg2rad(2))
+    half_turn = abs(X_OO.rotation().matrix()[0, 0])
+    assert half_turn > np.cos(np.deg2rad(5))
