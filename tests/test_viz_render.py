@@ -100,13 +100,15 @@ def test_an_animation_holds_every_picture_in_order(tmp_path):
         save_animation([], "none", tmp_path)
 
 
-def test_depth_is_that_along_the_optical_axis(scene):
+def test_depth_is_that_along_the_optical_axis_and_fits_the_intrinsics(scene):
     diagram, _ = scene
     context = diagram.CreateDefaultContext()
-    info = CameraInfo(160, 120, 200.0, 200.0, 79.5, 59.5)
+    info = CameraInfo(320, 240, 1000.0, 1000.0, 150.0, 110.0)
     depth = render_depth(diagram, context, look_at([1.0, 0, 0], [0, 0, 0]), info)
-    # The face toward the camera lies 0.95 m away; half of it is imaged over 10.5 pixels.
+    # The face toward the camera lies 0.95 m away.
     hit = np.isfinite(depth)
     np.testing.assert_allclose(depth[hit], 0.95, atol=1e-3)
-    assert 20**2 <= hit.sum() <= 22**2
     assert np.isinf(depth[0, 0])
+    rows, columns = np.nonzero(hit)
+    np.testing.assert_allclose([columns.mean(), rows.mean()], [150.0, 110.0], atol=0.05)
+    assert np.isclose(np.ptp(columns) + 1, 1000 * 0.1 / 0.95, atol=1.0)

@@ -97,7 +97,7 @@ def render_depth(
         diagram: as for :func:`render`.
         context: as for :func:`render`.
         X_WC: pose of the camera's optical frame.
-        info: its intrinsics.
+        info: its intrinsics; pixel (u, v) has its centre at whole numbers.
         min_depth, max_depth: range of what is seen [m].
 
     Returns:
@@ -108,7 +108,16 @@ def render_depth(
         ValueError: the diagram has no SceneGraph.
     """
     clipping = ClippingRange(0.5 * min_depth, 2 * max_depth)
-    core = RenderCameraCore(_RENDERER, info, clipping, RigidTransform())
+    # Drake's renderers see through a pixel's corner what the intrinsics say of its centre.
+    rendered = CameraInfo(
+        info.width(),
+        info.height(),
+        info.focal_x(),
+        info.focal_y(),
+        info.center_x() + 0.5,
+        info.center_y() + 0.5,
+    )
+    core = RenderCameraCore(_RENDERER, rendered, clipping, RigidTransform())
     camera = DepthRenderCamera(core, DepthRange(min_depth, max_depth))
     query = _query(diagram, context)
     image = query.RenderDepthImage(camera, query.inspector().world_frame_id(), X_WC)
