@@ -44,7 +44,7 @@ for ax, points, title in zip(
     ax.plot(*points.T, "o", color="tab:blue", label="model")
     ax.plot(*scene.T, "o", color="tab:red", ms=4, label="scene")
     ax.set(title=title, aspect="equal")
-axes[0].legend()
+axes[0].legend(loc="lower right")
 fig.tight_layout()
 save_figure(fig, "plane")
 
