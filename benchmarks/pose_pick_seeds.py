@@ -58,7 +58,7 @@ def main() -> int:
         f"images to pose, {statistics.median(r.sim_time for r in reports):.1f} simulated s a run"
     )
     if args.out:
-        write_json(args.out, [report.to_json() for report in reports])
+        write_json(args.out, {"runs": [report.to_json() for report in reports]})
     return 0
 
 

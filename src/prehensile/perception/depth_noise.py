@@ -103,12 +103,18 @@ def add_depth_noise(
         free up to there. Both as Drake's ``ImageDepth32F`` has them.
 
     Raises:
-        InputError: a shape is wrong.
+        InputError: a shape is wrong, or a number of the config is out of range.
     """
-    if depth.ndim != 2:
-        raise InputError(f"depth has shape {depth.shape}; expected (H, W)")
-    if color is not None and (color.ndim != 3 or color.shape[:2] != depth.shape):
-        raise InputError(f"color has shape {color.shape}; expected {(*depth.shape, 3)}")
+    depth, K = np.asarray(depth), np.asarray(K)
+    if depth.ndim != 2 or min(depth.shape) < 2:
+        raise InputError(f"depth has shape {depth.shape}; expected (H, W), each at least 2")
+    if color is not None:
+        shapes = ((*depth.shape, 3), (*depth.shape, 4))
+        if color.shape not in shapes or color.dtype != np.uint8:
+            raise InputError(
+                f"color holds {color.dtype} of shape {color.shape}; expected uint8 of {shapes[0]}"
+            )
+    _check(config)
     if K.shape != (3, 3) or not np.isfinite(K).all() or K[0, 0] <= 0 or K[1, 1] <= 0:
         raise InputError("K is not a (3, 3) matrix of intrinsics with positive focal lengths")
     scale = np.float32(K[0, 0] * config.baseline)
@@ -130,7 +136,32 @@ def add_depth_noise(
         measured = scale / np.maximum(seen, 0)
     measured[far | (measured > config.max_depth)] = np.inf
     measured[(patches < missed) | (measured < config.min_depth)] = 0
-    return measured
+    return measured.astype(np.float32, copy=False)
+
+
+def _check(config: DepthNoiseConfig) -> None:
+    """Raises InputError naming each number that is out of range."""
+    highest = {
+        "flying_probability": 1.0,
+        "edge_missed": 1.0,
+        "missed": 1.0,
+        "grazing_angle": np.pi / 2,
+        "dark_level": 1.0,
+        "glare_level": 2.0,
+    }
+    positive = {"baseline", "edge_step", "min_depth", "max_depth"}
+    positive |= {"grazing_spread", "dark_spread", "glare_spread"}
+    faults = []
+    for name, value in vars(config).items():
+        high = highest.get(name, np.inf)
+        if not 0 <= value <= high or value == np.inf or (name in positive and value == 0):
+            least = "above 0" if name in positive else "at least 0"
+            most = "finite" if high == np.inf else f"at most {high:.4g}"
+            faults.append(f"{name} is {value}; it must be {least} and {most}")
+    if not config.min_depth < config.max_depth:
+        faults.append(f"max_depth is {config.max_depth}; it must be above min_depth")
+    if faults:
+        raise InputError(*faults)
 
 
 def axial_sigma(
@@ -150,8 +181,7 @@ def _disparity(
     """(H, W) true disparity [pixels]; 0 for too far, and somewhat too much for too near."""
     known: NDArray[np.float32] = np.array(depth, dtype=np.float32)
     known[~(known > 0)] = 0.5 * min_depth
-    np.divide(scale, known, out=known)
-    return known
+    return (scale / known).astype(np.float32, copy=False)
 
 
 def _missed_score(

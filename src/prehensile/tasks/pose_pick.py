@@ -50,6 +50,10 @@ class Finder(Protocol):
         """Where the object is near a pose in the second bin."""
         ...
 
+    def in_hand(self, senses: Senses, X_WGuess: RigidTransform, X_WG: RigidTransform) -> Sight:
+        """Where the object is near a pose, in the closed hand at X_WG over the first bin."""
+        ...
+
 
 @dc.dataclass(frozen=True)
 class PosePickConfig:
@@ -67,6 +71,9 @@ class PosePickConfig:
     open_time: float = 0.4
     # A closed hand narrower than this holds nothing [m]; above 0.
     empty_width: float = 0.015
+    # Grasps with lower scores may let the object slip; it is rather laid down first and looked at
+    # again.
+    good_grasp: float = 0.5
     # Height above the floor at which the object is let go [m]; 0 or more.
     release_height: float = 0.001
     # Looks in a row that tell nothing after which the task gives up; 1 or more.
@@ -141,7 +148,7 @@ class Memory:
 
 
 class PosePick:
-    """States: look, pick, lift, carry, lower, release, check; nudge, back, done."""
+    """States: look, pick, lift, carry, lower, release; nudge, back; done."""
 
     def __init__(
         self,
@@ -193,10 +200,12 @@ class PosePick:
         if state == "look" or transfer is None:
             return self._look(memory, time, senses)
         if state == "pick" and holding:
-            return self._move("lift", memory, transfer.lift)
+            return self._move("lift", memory, transfer.lift, config.settle_time)
         if state == "pick":
             memory = dc.replace(memory, avoid=(*memory.avoid, transfer.grasp.X_OG))
             return self._drop(memory, senses, "the fingers closed on nothing")
+        if state == "lift" and holding and memory.to_goal:
+            return self._inspect(memory, transfer, time, senses)
         if state == "lift" and holding:
             return self._move("carry", memory, transfer.carry)
         if state == "lift":
@@ -269,7 +278,10 @@ class PosePick:
     ) -> tuple[Decision, str]:
         """Takes the object to its goal, or else lays it into the open, or else nudges it."""
         config = self.config
-        plan = self._planner.plan(memory.q, X_WO, self._goals, rng, avoid=memory.avoid)
+        planner, avoid = self._planner, memory.avoid
+        plan = planner.plan(
+            memory.q, X_WO, self._goals, rng, min_score=config.good_grasp, avoid=avoid
+        )
         what, to_goal, reason = "to the goal", True, plan.reason
         if plan.transfer is None:
             center = self._pick_bin.X_WB.translation().copy()
@@ -277,10 +289,13 @@ class PosePick:
             lying = [
                 X
                 for X in lying_poses(center, float(self._shape.half_extent[0]), rng)
-                if self._planner.has_grasp(X, self._goals)
+                if planner.has_grasp(X, self._goals)
             ]
-            plan = self._planner.plan(memory.q, X_WO, lying, rng, avoid=memory.avoid)
+            plan = planner.plan(memory.q, X_WO, lying, rng, avoid=avoid)
             what, to_goal = f"laid down first: {reason}", False
+        if plan.transfer is None:
+            plan = planner.plan(memory.q, X_WO, self._goals, rng, avoid=avoid)
+            what, to_goal = "to the goal by a poor grasp", True
         transfer = plan.transfer
         if transfer is None:
             return self._nudge(memory, X_WO, rng, plan.reason)
@@ -294,6 +309,30 @@ class PosePick:
         )
         memory = dc.replace(memory, transfer=transfer, to_goal=to_goal, q=transfer.approach.q_end)
         return Decision("pick", memory, motion), what
+
+    def _inspect(self, memory: Memory, transfer: Transfer, now: float, senses: Senses) -> Decision:
+        """Looks how the hand holds the object, and plans the rest for that.
+
+        Closing fingers move what they close on. Where the look tells nothing, or nothing that can
+        be, the plan stays as it is.
+        """
+        X_WG = self._arm.pose(senses.q)
+        X_WGuess = X_WG @ transfer.X_OG.inverse()
+        sight = self._finder.in_hand(senses, X_WGuess, X_WG)
+        seen = time.perf_counter()
+        what = "held as planned"
+        if sight.X_WO is not None and not sight.reason:
+            rng = np.random.default_rng([self._seed, memory.attempts, 2])
+            X_OG = sight.X_WO.inverse() @ X_WG
+            rest = self._planner.plan_rest(memory.q, transfer, X_OG, self._goals, rng)
+            if rest is not None:
+                transfer, what = rest, "held as seen"
+        look = Look(now, sight, time.perf_counter() - seen, what)
+        memory = dc.replace(
+            memory, transfer=transfer, q=transfer.carry.q_end, looks=(*memory.looks, look)
+        )
+        wait = Segment.wait(transfer.lift.q_end, 0.0, self.config.think_time)
+        return Decision("carry", memory, SegmentPlayer([wait, Segment.move(transfer.carry, 0.0)]))
 
     def _nudge(
         self, memory: Memory, X_WO: RigidTransform, rng: np.random.Generator, reason: str

@@ -8,8 +8,10 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.behavior.state_machine import Senses
+from prehensile.grasping import ParallelGripper
+from prehensile.kinematics.poses import pose_distance
 from prehensile.perception.camera_model import CameraModel, PosedCamera
-from prehensile.perception.cloud import PointCloud
+from prehensile.perception.cloud import Box, PointCloud
 from prehensile.perception.depth import DepthConfig
 from prehensile.perception.free_space import DepthView
 from prehensile.perception.fusion import fuse
@@ -40,12 +42,25 @@ class FinderConfig:
             min_depth=0.3, max_depth=1.5, window=9, noise_quadratic=0.0025
         )
     )
-    # How the object is looked for. Flying pixels and ragged edges seem to see through its rim.
+    # How the object is looked for. Flying pixels and ragged edges seem to see through its rim, and
+    # walls hide much of it.
     locate: LocateConfig = field(
-        default_factory=lambda: LocateConfig(tolerance=0.003, max_violation=0.3)
+        default_factory=lambda: LocateConfig(
+            tolerance=0.003, max_violation=0.3, min_coverage=0.3, min_score=0.3
+        )
     )
     # How its pose is refined from a guess, where one is known.
     refine: RefineConfig = field(default_factory=RefineConfig)
+    # The same in the hand, where less of it is seen.
+    refine_in_hand: RefineConfig = field(
+        default_factory=lambda: RefineConfig(initial_scale=0.012, min_overlap=0.3)
+    )
+    # What is no further from the hand than this is the hand [m]; 0 or more.
+    hand_margin: float = 0.004
+    # Furthest that the object can slip in the hand [m]; above 0.
+    slip_distance: float = 0.04
+    # And how far it can turn [rad]; above 0.
+    slip_angle: float = 0.7
 
 
 class CameraFinder:
@@ -60,6 +75,7 @@ class CameraFinder:
         pick_bin: BinGeometry,
         place_bin: BinGeometry,
         symmetries: Sequence[RotationMatrix],
+        gripper: ParallelGripper,
         config: FinderConfig | None = None,
     ) -> None:
         """Makes the finder.
@@ -72,8 +88,10 @@ class CameraFinder:
             pick_bin: the first bin.
             place_bin: the second bin.
             symmetries: rotations of O that leave the object's shape as it is.
+            gripper: shape of the hand, which is not the object's.
             config: settings; ``FinderConfig()`` if None.
         """
+        self._gripper = gripper
         self._known, self._models = known, models
         self._find_cameras, self._check_cameras = find_cameras, check_cameras
         self._pick_bin, self._place_bin = pick_bin, place_bin
@@ -107,6 +125,40 @@ class CameraFinder:
         result = refine_pose(cloud, self._known.field, X_WGuess, self.config.refine)
         if result.X_WO is None or not result.succeeded:
             return Sight(None, f"{result.status.value}: {result.message}")
+        return Sight(result.X_WO, seconds=time.perf_counter() - started)
+
+    def in_hand(self, senses: Senses, X_WGuess: RigidTransform, X_WG: RigidTransform) -> Sight:
+        """Where the object is in the closed hand at X_WG, near a guess.
+
+        What is near the guess but of the hand itself is left out. A pose further from the guess
+        than an object can slip in a hand is none.
+        """
+        views = self._views(senses, self._find_cameras)
+        started = time.perf_counter()
+        config = self.config
+        size = 2 * np.abs(self._known.cloud.points).max(axis=0) + 2 * config.slip_distance
+        cloud = fuse(
+            [view.depth for view in views],
+            [view.camera for view in views],
+            Box(X_WGuess, size),
+            config.voxel_size,
+            config=config.depth,
+        )
+        centres, sizes = self._gripper.boxes(np.array([senses.width]))
+        hand = [
+            Box(X_WG @ RigidTransform(centre), size)
+            for centre, size in zip(centres[0], sizes[0], strict=True)
+        ]
+        cloud = subtract(cloud, hand, margin=config.hand_margin)
+        if len(cloud) < config.min_points:
+            return Sight(None, f"{len(cloud)} points are in the hand")
+        result = refine_pose(cloud, self._known.field, X_WGuess, config.refine_in_hand)
+        if result.X_WO is None or not result.succeeded:
+            return Sight(None, f"{result.status.value}: {result.message}")
+        distance, angle = pose_distance(result.X_WO, X_WGuess)
+        if distance > config.slip_distance or angle > config.slip_angle:
+            said = f"{1e3 * distance:.0f} mm and {np.rad2deg(angle):.0f} degrees"
+            return Sight(None, f"{said} from where it should be in the hand")
         return Sight(result.X_WO, seconds=time.perf_counter() - started)
 
     def _views(self, senses: Senses, names: Sequence[str]) -> list[DepthView]:

@@ -4,7 +4,7 @@ Frames: W world, O the object, G the hand.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class Transfer:
 
     Attributes:
         grasp: by which it is held.
-        X_WG: the hand at the grasp.
+        X_OG: the hand in the object's frame: the grasp's, or that with the fingers exchanged.
         X_WTarget: where the object is set down.
         approach: from the start to the grasp.
         lift: straight up with the object.
@@ -54,7 +54,7 @@ class Transfer:
     """
 
     grasp: ModelGrasp
-    X_WG: RigidTransform
+    X_OG: RigidTransform
     X_WTarget: RigidTransform
     approach: TimedPath
     lift: TimedPath
@@ -118,6 +118,7 @@ class TransferPlanner:
         rng: np.random.Generator,
         *,
         max_grasps: int = 12,
+        min_score: float = -np.inf,
         avoid: Sequence[RigidTransform] = (),
     ) -> TransferPlan:
         """The motions by the best grasp that serves both ends.
@@ -128,6 +129,7 @@ class TransferPlanner:
             targets: where it may be set down, all equally good.
             rng: of all searches.
             max_grasps: grasps for which all motions are planned before giving up.
+            min_score: grasps with lower scores are passed over.
             avoid: grasps X_OG that failed before; those like them are passed over.
         """
         rejected: dict[str, int] = {}
@@ -139,6 +141,9 @@ class TransferPlanner:
         outside = self._outside_walls(X_WO)
         served_at = np.array([self._outside_walls(X) for X in targets])
         for index, grasp in enumerate(self._grasps):
+            if grasp.score < min_score:
+                reject("the grasps left are poor")
+                continue
             if any(_alike(grasp.X_OG, X) for X in avoid):
                 continue
             if not outside[index]:
@@ -169,6 +174,42 @@ class TransferPlanner:
                 break
         worst = sorted(rejected.items(), key=lambda item: -item[1])[:3]
         return TransferPlan(None, "; ".join(f"{reason} ({n} grasps)" for reason, n in worst))
+
+    def plan_rest(
+        self,
+        q_start: NDArray[np.float64],
+        transfer: Transfer,
+        X_OG: RigidTransform,
+        targets: Sequence[RigidTransform],
+        rng: np.random.Generator,
+    ) -> Transfer | None:
+        """The transfer under way, from after the lift on, for another pose in the hand.
+
+        Args:
+            q_start: where the arm is (n,).
+            transfer: the one under way.
+            X_OG: how the hand truly holds the object.
+            targets: where it may be set down, all equally good.
+            rng: of all searches.
+
+        Returns:
+            The same with new motions; None if there are none.
+        """
+        held = (self._held, X_OG.inverse())
+        for X_WTarget in targets:
+            placed, _ = self._place(transfer.grasp, q_start, X_OG, X_WTarget, held, rng)
+            if placed is not None:
+                carry, lower, retreat, home, width = placed
+                return replace(
+                    transfer,
+                    X_WTarget=X_WTarget,
+                    carry=carry,
+                    lower=lower,
+                    retreat=retreat,
+                    home=home,
+                    release_width=width,
+                )
+        return None
 
     def has_grasp(
         self, X_WO: RigidTransform, targets: Sequence[RigidTransform], *, most: int = 40
@@ -299,7 +340,7 @@ class TransferPlanner:
                 if placed is not None:
                     slow = arm.limits.scaled(1.0, _OPTIONS.carry_acceleration)
                     lift = time_parameterize(up.path, slow, speed=0.4)
-                    return Transfer(grasp, X_WG, X_WTarget, approach, lift, *placed), ""
+                    return Transfer(grasp, X_OG, X_WTarget, approach, lift, *placed), ""
         return None, reason
 
     def _place(

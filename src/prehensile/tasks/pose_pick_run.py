@@ -82,6 +82,10 @@ class TrueFinder:
         """The true pose."""
         return self.find(senses)
 
+    def in_hand(self, senses: Senses, X_WGuess: RigidTransform, X_WG: RigidTransform) -> Sight:
+        """The true pose."""
+        return self.find(senses)
+
 
 def load_surface(model: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices (V, 3) in O [m] and faces (F, 3) of an embedded model's surface."""
@@ -166,7 +170,7 @@ class PosePickRun:
             known = KnownObject.from_mesh(TriangleMesh(vertices, faces))
             models = {name: intrinsics(config) for name, config in scenario.cameras.items()}
             finder = CameraFinder(
-                known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries
+                known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries, WSG50
             )
         task = PosePick(arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed)
         self.cameras = {name: intrinsics(scenario.cameras[name]).K for name in _FIND}
