@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
+#include <shared_mutex>
 #include <stdexcept>
 
 #include "bindings.h"
@@ -60,7 +62,14 @@ nb::tuple WithinRadius(const KdTree& tree, nb::handle queries_argument, double r
   return nb::make_tuple(counts.Take(), indices.Take(), distances.Take());
 }
 
-nb::tuple NearestInVoxels(const VoxelHash& voxels, nb::handle queries_argument, int num_threads) {
+/// Of Python's threads, one may insert while others, without the GIL, query.
+struct SharedVoxels {
+  explicit SharedVoxels(double max_distance) : voxels(max_distance) {}
+  VoxelHash voxels;
+  mutable std::shared_mutex mutex;
+};
+
+nb::tuple NearestInVoxels(const SharedVoxels& self, nb::handle queries_argument, int num_threads) {
   const ArrayArgument queries(queries_argument, "queries");
   queries.RequireShape({-1, 3});
   queries.RequireFinite();
@@ -71,7 +80,8 @@ nb::tuple NearestInVoxels(const VoxelHash& voxels, nb::handle queries_argument, 
   double* const distance = distances.data();
   {
     const nb::gil_scoped_release release;
-    voxels.NearestBatch(queries.data(), m, num_threads, index, distance);
+    const std::shared_lock lock(self.mutex);
+    self.voxels.NearestBatch(queries.data(), m, num_threads, index, distance);
     std::transform(distance, distance + m, distance, [](double d) { return std::sqrt(d); });
   }
   return nb::make_tuple(indices.Take(), distances.Take());
@@ -93,16 +103,22 @@ void BindKdTree(nb::module_& m) {
       .def("__len__", &KdTree::size)
       .def("nearest", &Nearest, "queries"_a, "k"_a, "max_distance"_a, "num_threads"_a)
       .def("within_radius", &WithinRadius, "queries"_a, "radius"_a, "num_threads"_a);
-  nb::class_<VoxelHash>(m, "VoxelHash")
+  nb::class_<SharedVoxels>(m, "VoxelHash")
       .def(nb::init<double>(), "max_distance"_a)
-      .def("__len__", &VoxelHash::size)
+      .def("__len__",
+           [](const SharedVoxels& self) {
+             const nb::gil_scoped_release release;
+             const std::shared_lock lock(self.mutex);
+             return self.voxels.size();
+           })
       .def(
           "insert",
-          [](VoxelHash& self, nb::handle points_argument) {
-            // With the GIL: nobody may query meanwhile.
+          [](SharedVoxels& self, nb::handle points_argument) {
             const ArrayArgument points(points_argument, "points");
             points.RequireShape({-1, 3});
-            self.Insert(points.data(), points.shape(0));
+            const nb::gil_scoped_release release;
+            const std::unique_lock lock(self.mutex);
+            self.voxels.Insert(points.data(), points.shape(0));
           },
           "points"_a)
       .def("nearest", &NearestInVoxels, "queries"_a, "num_threads"_a);

@@ -349,6 +349,10 @@ BranchAndBoundPose BranchAndBound(const PointRows& scene, const PointRows& model
                                   const BranchAndBoundOptions& options) {
   Require(scene.rows() > 0 && scene.allFinite(), "scene_points: some are needed, all finite");
   Require(model.rows() > 0 && model.allFinite(), "model_points: some are needed, all finite");
+  Require(scene.cwiseAbs().maxCoeff() < 1e100, "scene_points: farther than 1e100 from the origin");
+  Require(model.cwiseAbs().maxCoeff() < 1e100, "model_points: farther than 1e100 from the origin");
+  // The grid of nearest neighbours takes memory by their number, some 100 kB each.
+  Require(model.rows() <= 10'000, "model_points: more than 10000; down-sample them");
   Require(options.max_distance > 0, "max_distance: must be positive");
   Require(options.max_gap >= 0, "max_gap: must not be negative");
   Require(options.max_nodes >= 0, "max_nodes: must not be negative");

@@ -21,12 +21,13 @@ class CellGrid {
   /// @param cell edge of a cell.
   /// @param name of the argument that the edge comes from, for messages.
   /// @throws std::invalid_argument if the edge is not positive and finite, a point not finite or
-  ///   more than 2²⁰ cells from the origin, or n ≥ 2³¹.
+  ///   more than 2²⁰ cells from the origin, or n ≥ 2³⁰.
   CellGrid(const double* points, std::size_t n, double cell, const char* name) {
     if (!(cell > 0) || !std::isfinite(cell)) {
       throw std::invalid_argument(std::string(name) + ": must be positive and finite");
     }
-    if (n >= (std::size_t{1} << 31)) throw std::invalid_argument("points: too many, 2^31 or more");
+    // So that three times an index fits 32 bits.
+    if (n >= (std::size_t{1} << 30)) throw std::invalid_argument("points: too many, 2^30 or more");
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(n);
     const double inverse = 1.0 / cell;
     constexpr double kLimit = static_cast<double>(kMaxIndex) - 2;  // Room for neighbours.
@@ -81,6 +82,29 @@ class CellGrid {
       bucket = (bucket + 1) & (table_.size() - 1);
     }
     return -1;
+  }
+
+  /// The number of pairs of points in one cell or in two that touch.
+  std::uint64_t num_adjacent_pairs() const {
+    std::uint64_t pairs = 0;
+    for (std::size_t c = 0; c < num_cells(); ++c) {
+      const std::uint64_t own = begin_[c + 1] - begin_[c];
+      pairs += own * (own - 1) / 2;
+      for (int d = 14; d < 27; ++d) {
+        const std::int64_t other = Neighbor(c, d / 9 - 1, d / 3 % 3 - 1, d % 3 - 1);
+        if (other >= 0) pairs += own * (begin_[other + 1] - begin_[other]);
+      }
+    }
+    return pairs;
+  }
+
+  /// For what keeps a list of them: far too many are an error, not the end of memory.
+  ///
+  /// @throws std::invalid_argument if there are more than 2²⁷ adjacent pairs.
+  void RequireFewPairs(const char* name) const {
+    if (num_adjacent_pairs() <= std::uint64_t{1} << 27) return;
+    throw std::invalid_argument(std::string(name) +
+                                ": too large for so dense a cloud; down-sample it first");
   }
 
   /// Calls visit(i, j) once for each pair of points in one cell or in two that touch.

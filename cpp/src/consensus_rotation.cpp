@@ -89,6 +89,7 @@ RotationConsensus GncRotation(const PointRows& a, const PointRows& b, double bou
   Require(a.rows() > 0, "points: there must be some");
   Require(a.allFinite() && b.allFinite(), "points: must be finite");
   Require(bound > 0 && std::isfinite(bound), "bound: must be positive and finite");
+  Require(max_iterations >= 1, "max_iterations: must be at least 1");
   const auto n = static_cast<std::size_t>(a.rows());
   const double c2 = bound * bound;
   std::vector<double> weights(n, 1), squares(n);

@@ -209,7 +209,7 @@ class Fusion {
   /// are threads.
   std::vector<Strip> MakeStrips() const {
     std::vector<std::pair<Range, Range>> regions;
-    int num_rows = 0;
+    std::size_t num_rows = 0;
     for (std::size_t i = 0; i < views_.size(); ++i) {
       regions.push_back(RegionOfInterest(views_[i], placements_[i]));
       if (!regions[i].first.empty()) num_rows += regions[i].second.end - regions[i].second.begin;
@@ -217,7 +217,8 @@ class Fusion {
     const int num_shares = internal::NumShares(num_rows, 64, options_.num_threads);
     // Rows at the borders of strips are read twice, but threads should end at
     // the same time.
-    const int strip_rows = num_shares == 1 ? num_rows : std::max(32, num_rows / (4 * num_shares));
+    const int strip_rows = static_cast<int>(std::clamp<std::size_t>(
+        num_shares == 1 ? num_rows : num_rows / (4 * std::size_t(num_shares)), 32, 1 << 15));
     std::vector<Strip> strips;
     for (std::size_t i = 0; i < views_.size(); ++i) {
       const auto [columns, rows] = regions[i];

@@ -170,8 +170,9 @@ void DepthRows::Read(int v, bool wanted) {
     // What lies outside the box is no neighbour either: slivers of the bin's walls get no normal.
     const PointRow points = points_at(v);
     if (!kernel_.place(w, rays_.Row(v), *placement_, range.begin, range.end, points)) return;
-    while (points.voxel[0][range.begin] < 0) ++range.begin;
-    while (points.voxel[0][range.end - 1] < 0) --range.end;
+    // From far off, rounding may put a point of the box outside of the grid: none may be left.
+    while (!range.empty() && points.voxel[0][range.begin] < 0) ++range.begin;
+    while (!range.empty() && points.voxel[0][range.end - 1] < 0) --range.end;
   }
   if (wanted) RangeAt(v) = range;
 }

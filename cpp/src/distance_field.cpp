@@ -90,6 +90,7 @@ void NearestBodyAtRows(const std::vector<const DistanceField*>& fields,
                        int num_threads, double* distances, double* gradients,
                        std::int32_t* bodies) {
   internal::Require(!fields.empty(), "fields: none");
+  for (const DistanceField* field : fields) internal::Require(field, "fields: one is none");
   internal::Require(fields.size() == X_WL.size(), "X_WL: not as many as fields");
   std::vector<Eigen::Isometry3d> X_LW;
   for (const Eigen::Isometry3d& X : X_WL) X_LW.push_back(X.inverse());

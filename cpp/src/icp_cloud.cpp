@@ -31,6 +31,8 @@ IcpCloud::IcpCloud(const double* points, std::size_t n, const double* normals,
   internal::Require(n > 0, "points: there is no point");
   if (normals) normals_ = Rows(normals, n, "normals: must be finite");
   if (intensities) intensities_.assign(intensities, intensities + n);
+  for (const double x : intensities_)
+    internal::Require(std::isfinite(x), "intensities: not finite");
   const bool estimate = needs.normals && normals_.empty();
   if (needs.tree || estimate) tree_.emplace(points, n);
   if (estimate) EstimateNormals();

@@ -47,6 +47,7 @@ std::vector<std::int64_t> ConvexSegments(const double* points, const double* nor
                                          const ConvexSegmentsOptions& options) {
   const double voxel = options.voxel_size;
   const CellGrid grid(points, n, voxel, "voxel_size");
+  grid.RequireFewPairs("voxel_size");
   enum Kind : std::uint8_t { kJoined, kApart, kEdge };
   struct Pair {
     std::uint32_t i, j;
@@ -104,7 +105,10 @@ std::vector<std::int64_t> ConvexSegments(const double* points, const double* nor
 std::vector<std::int64_t> RestingPairs(const double* points, const double* normals,
                                        const std::int64_t* labels, std::size_t n, double voxel_size,
                                        std::size_t num_labels) {
+  // Their square is what is allocated.
+  internal::Require(num_labels <= std::size_t{1} << 13, "num_labels: more than 2^13");
   const CellGrid grid(points, n, voxel_size, "voxel_size");
+  grid.RequireFewPairs("voxel_size");
   for (std::size_t i = 0; i < n; ++i) {
     internal::Require(labels[i] < static_cast<std::int64_t>(num_labels), "labels: out of range");
   }

@@ -65,7 +65,7 @@ PlaneResult RansacPlane(const double* points, std::size_t n, const RansacPlaneOp
           "max_distance: must be positive and finite");
   Require(options.confidence > 0 && options.confidence < 1, "confidence: must lie in (0, 1)");
   Require(options.max_iterations > 0, "max_iterations: must be at least 1");
-  Require(n < (std::size_t{1} << 31), "points: too many, 2^31 or more");
+  Require(n < (std::size_t{1} << 30), "points: too many, 2^30 or more");
   for (std::size_t i = 0; i < 3 * n; ++i) Require(std::isfinite(points[i]), "points: not finite");
   PlaneResult result;
   result.inliers.assign(n, 0);
@@ -144,6 +144,7 @@ std::vector<std::int64_t> GrowPlanes(const double* points, const double* normals
   Require(options.max_distance > 0, "max_distance: must be positive");
   Require(options.max_angle > 0, "max_angle: must be positive");
   const CellGrid grid(points, n, options.radius, "radius");
+  grid.RequireFewPairs("radius");
   const double limit = options.radius * options.radius;
   std::vector<std::uint32_t> start(n + 1, 0), neighbors;
   {
@@ -160,7 +161,6 @@ std::vector<std::int64_t> GrowPlanes(const double* points, const double* normals
     std::size_t total = 0;
     for (std::uint32_t& s : start) {
       const std::uint32_t count = s;
-      Require(total < (std::size_t{1} << 32) - count, "radius: too many neighbours");
       s = static_cast<std::uint32_t>(total);
       total += count;
     }
