@@ -83,7 +83,8 @@ std::vector<TrackedBody> Bodies(const Fields& fields, nb::handle X_WB, const cha
 
 nb::object PointsNear(const nb::list& views, const Fields& fields, nb::handle X_WB,
                       nb::handle boxes_B, const Fields& other_fields, nb::handle X_WK,
-                      double max_distance, double other_margin, int max_pixels) {
+                      double max_distance, double other_margin, int max_pixels,
+                      double max_normal_angle) {
   const Views images(views);
   std::vector<TrackedBody> bodies = Bodies(fields, X_WB, "X_WB");
   const ArrayArgument boxes(boxes_B, "boxes");
@@ -98,7 +99,8 @@ nb::object PointsNear(const nb::list& views, const Fields& fields, nb::handle X_
   std::vector<double> points;
   {
     const nb::gil_scoped_release release;
-    points = PointsNearBodies(images.get(), bodies, others, max_distance, other_margin, max_pixels);
+    points = PointsNearBodies(images.get(), bodies, others, max_distance, other_margin,
+                              max_normal_angle, max_pixels);
   }
   return ArrayResult<>({points.size() / 3, 3}, points.data()).Take();
 }
@@ -174,7 +176,8 @@ nb::object Violation(nb::handle points_W, const nb::list& view, double margin) {
 
 void BindTracking(nb::module_& m) {
   m.def("points_near_bodies", &PointsNear, "views"_a, "fields"_a, "X_WB"_a, "boxes"_a,
-        "other_fields"_a, "X_WK"_a, "max_distance"_a, "other_margin"_a, "max_pixels"_a);
+        "other_fields"_a, "X_WK"_a, "max_distance"_a, "other_margin"_a, "max_pixels"_a,
+        "max_normal_angle"_a = M_PI);
   m.def("body_terms", &Terms, "points"_a, "fields"_a, "X_WB"_a, "loss"_a, "loss_scale"_a, "views"_a,
         "samples"_a, "margin"_a, "max_violation"_a, "search_radius"_a, "free_space_weight"_a);
   m.def("free_space_violation", &Violation, "points_W"_a, "view"_a, "margin"_a);

@@ -107,6 +107,45 @@ Region RegionOf(const DepthView& view, const TrackedBody& body, const Box& box,
           inside(high[1] + 1, view.height)};
 }
 
+/// The derivative of the logarithm of the depth by the line of sight's slope along u or v, from the
+/// pixels a few millimetres before and after one; false if neither was measured, or if both lie on
+/// other surfaces.
+bool Slope(const DepthView& view, int u, int v, int du, int dv, double z, double focal,
+           double* slope) {
+  constexpr double kReach = 0.005;  // [m]
+  constexpr double kSteepest = 5;   // Where it rises by more, another surface begins.
+  const int step = static_cast<int>(internal::Clamped(kReach * focal / z + 0.5, 1, 8));
+  double rises = 0;
+  int count = 0;
+  for (const int side : {-step, step}) {
+    const int x = u + side * du;
+    const int y = v + side * dv;
+    if (x < 0 || y < 0 || x >= view.width || y >= view.height) continue;
+    const double depth = DepthAt(view, x, y);
+    const double rise = (depth - z) * focal / (side * z);
+    if (depth == 0 || std::abs(rise) > kSteepest) continue;
+    rises += rise;
+    ++count;
+  }
+  if (count == 0) return false;
+  *slope = rises / count;
+  return true;
+}
+
+/// The direction, not of unit length, out of the surface that a pixel shows, expressed in C; zero
+/// where it cannot be told.
+Vector3d MeasuredNormal(const DepthView& view, int u, int v, double z) {
+  double a = 0;
+  double b = 0;
+  if (!Slope(view, u, v, 1, 0, z, view.fx, &a) || !Slope(view, u, v, 0, 1, z, view.fy, &b)) {
+    return Vector3d::Zero();
+  }
+  // The cross product of the derivatives of z [x, y, 1] by x and y, over z^2, turned to the camera.
+  const double x = (u - view.cx) / view.fx;
+  const double y = (v - view.cy) / view.fy;
+  return {a, b, -(1 + a * x + b * y)};
+}
+
 void Accumulate(const Vector3d& arm, const Vector3d& direction, double residual, double weight,
                 BodyTerm* term) {
   // The residual falls as the body moves along the direction: J = -[arm × n; n].
@@ -196,12 +235,15 @@ double WayAside(const DepthView& view, int u, int v, double z, double max_depth,
 std::vector<double> PointsNearBodies(const std::vector<DepthView>& views,
                                      const std::vector<TrackedBody>& bodies,
                                      const std::vector<TrackedBody>& others, double max_distance,
-                                     double other_margin, int max_pixels) {
+                                     double other_margin, double max_normal_angle, int max_pixels) {
   Check(bodies, "bodies: each needs a field");
   Check(others, "others: each needs a field");
   Require(max_distance > 0 && std::isfinite(max_distance), "max_distance: must be positive");
   Require(other_margin >= 0 && std::isfinite(other_margin), "other_margin: must be 0 or more");
+  Require(max_normal_angle >= 0, "max_normal_angle: must be 0 or more");
   Require(max_pixels >= 1, "max_pixels: must be at least 1");
+  const bool any_normal = max_normal_angle >= M_PI;
+  const double min_cosine = std::cos(std::min(max_normal_angle, M_PI));
   std::vector<Box> boxes;
   std::vector<Box> other_boxes;
   for (const TrackedBody& body : bodies) boxes.emplace_back(body);
@@ -229,12 +271,20 @@ std::vector<double> PointsNearBodies(const std::vector<DepthView>& views,
         const Vector3d p_C((u - view.cx) / view.fx * z, (v - view.cy) / view.fy * z, z);
         const Vector3d p_W = view.R_WC * p_C + view.p_WC;
         double nearest = kInfinity;
+        Vector3d outward = Vector3d::Zero();
         for (std::size_t i = 0; i < bodies.size(); ++i) {
           const Vector3d p_B = bodies[i].R_WB.transpose() * (p_W - bodies[i].p_WB);
           if (!boxes[i].IsNear(p_B, max_distance)) continue;
-          nearest = std::min(nearest, std::abs(bodies[i].field->OrientedAt(p_B).distance));
+          const DistanceField::Value value = bodies[i].field->OrientedAt(p_B);
+          if (std::abs(value.distance) >= nearest) continue;
+          nearest = std::abs(value.distance);
+          outward = bodies[i].R_WB * value.gradient;
         }
         if (!(nearest <= max_distance)) continue;
+        if (!any_normal) {
+          const Vector3d normal = view.R_WC * MeasuredNormal(view, u, v, z);
+          if (normal.dot(outward) < min_cosine * normal.norm() * outward.norm()) continue;
+        }
         bool is_other = false;
         const double claimed = std::min(nearest, other_margin);
         for (std::size_t i = 0; i < others.size() && !is_other; ++i) {

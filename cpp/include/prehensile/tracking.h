@@ -51,13 +51,16 @@ struct TrackedBody {
 /// @param others bodies that are in the way, such as a hand: a point within other_margin of one of
 ///   them, and nearer to it than to any body, is left out.
 /// @param max_distance of a point from the nearest body's surface [m].
+/// @param max_normal_angle between the surface that the image shows at a point and the body's
+///   nearest to it; one that is turned further, as a table's beside a box, is another's [rad].
+///   Points whose surface cannot be told from their neighbours stay.
 /// @param max_pixels looked at in each image, at least 1.
 /// @return rows of x, y, z in W.
 /// @throws std::invalid_argument naming the argument.
 std::vector<double> PointsNearBodies(const std::vector<DepthView>& views,
                                      const std::vector<TrackedBody>& bodies,
                                      const std::vector<TrackedBody>& others, double max_distance,
-                                     double other_margin, int max_pixels);
+                                     double other_margin, double max_normal_angle, int max_pixels);
 
 /// The Gauss-Newton terms of one body: the cost near its pose is
 /// cost + 2 gradient · d + d · information d for a motion d = [w; v].

@@ -479,9 +479,11 @@ def points_near_bodies(
     max_distance: float,
     other_margin: float,
     max_pixels: int,
+    max_normal_angle: float = ...,
 ) -> NDArray[np.float64]:
-    """(M, 3) measured points near the bodies' surfaces and not nearer to the others; boxes (L, 2, 3)
-    are the least and greatest coordinates of each in B."""
+    """(M, 3) measured points near the bodies' surfaces and not nearer to the others, on surfaces
+    turned no further from the bodies' than max_normal_angle; boxes (L, 2, 3) are the least and
+    greatest coordinates of each in B."""
 
 def body_terms(
     points: ArrayLike,

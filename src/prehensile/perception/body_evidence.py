@@ -85,6 +85,8 @@ class Body:
         """
         if num_samples < 1:
             raise ValueError(f"num_samples: must be at least 1, not {num_samples}")
+        if not 0 < mesh.area() < np.inf:
+            raise ValueError(f"mesh: its area must be positive and finite, not {mesh.area()}")
         field = field or DistanceField.from_mesh(mesh)
         rng = np.random.default_rng(seed)
         # Many candidates, of which those on the outer surface are thinned out evenly: each time
@@ -127,6 +129,8 @@ class EvidenceConfig:
         free_space_weight: of a sample's violation against a point's distance, >= 0.
         occluder_margin: points this near to a body in the way, and nearer to it than to those
             looked for, are its own [m], >= 0.
+        max_normal_angle: points whose surface is turned further from the nearest one looked for,
+            as a table's beside a box that stands on it, are another's [rad], >= 0; pi for any.
     """
 
     noise: float = 0.002
@@ -140,6 +144,7 @@ class EvidenceConfig:
     search_radius: int = 12
     free_space_weight: float = 2.0
     occluder_margin: float = 0.01
+    max_normal_angle: float = float(np.deg2rad(60))
 
     def __post_init__(self) -> None:
         """Checks the ranges that the kernels do not check.
@@ -218,6 +223,7 @@ class BodyEvidence:
             max_distance,
             config.occluder_margin,
             config.max_pixels,
+            config.max_normal_angle,
         )
 
     def gate(self, deviation: float) -> float:
