@@ -25,14 +25,9 @@ from prehensile.tasks.pose_pick import (
 from prehensile.tasks.pose_pick_finder import believed
 from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_moves import lying_poses
+from prehensile.tasks.pose_pick_object import MODEL, load_surface
 from prehensile.tasks.pose_pick_report import adds
-from prehensile.tasks.pose_pick_run import (
-    MODEL,
-    PosePickRun,
-    check_goal,
-    default_goal,
-    load_surface,
-)
+from prehensile.tasks.pose_pick_run import PosePickRun, check_goal, default_goal
 from prehensile.tasks.pose_pick_scene import START_KINDS, random_rest_pose
 
 SIZE = np.array([0.04, 0.07, 0.16])

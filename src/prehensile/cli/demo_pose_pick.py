@@ -7,6 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from prehensile.files import write_json
+from prehensile.tasks.pose_pick_object import PreparedObject, prepare_object
 from prehensile.tasks.pose_pick_report import PosePickReport
 from prehensile.tasks.pose_pick_run import PosePickRun
 from prehensile.viz.images import colorize_depth, draw_points, save_png, side_by_side
@@ -38,11 +39,12 @@ def run_demo(*, seed: int, trials: int, browser: bool, out: Path) -> list[PosePi
     check_writable(out / "replay.html")
     console = Console()
     reports = []
+    thing = prepare_object()
     for number in range(trials):
         folder = out if trials == 1 else out / f"seed{seed + number:03d}"
         folder.mkdir(exist_ok=True)
         shown = number == 0
-        report = _trial(console, seed + number, folder, out, shown=shown, browser=browser)
+        report = _trial(console, seed + number, thing, folder, out, shown=shown, browser=browser)
         reports.append(report)
         if report.interrupted:
             break
@@ -56,7 +58,14 @@ def run_demo(*, seed: int, trials: int, browser: bool, out: Path) -> list[PosePi
 
 
 def _trial(
-    console: Console, seed: int, folder: Path, out: Path, *, shown: bool, browser: bool
+    console: Console,
+    seed: int,
+    thing: PreparedObject,
+    folder: Path,
+    out: Path,
+    *,
+    shown: bool,
+    browser: bool,
 ) -> PosePickReport:
     """One run; the first one is shown and recorded."""
     recorder = meshcat = None
@@ -64,7 +73,7 @@ def _trial(
         meshcat = start_meshcat(open_browser=browser)
         console.print(f"watching at [link]{meshcat.web_url()}[/link]")
         recorder = Recorder(meshcat)
-    run = PosePickRun(seed=seed, meshcat=meshcat)
+    run = PosePickRun(seed=seed, thing=thing, meshcat=meshcat)
     if recorder is not None:
         recorder.start()
     console.print(f"[bold]seed {seed}[/bold]: the bottle was let go {run.start.start}")

@@ -16,10 +16,6 @@ from pydrake.systems.sensors import ImageDepth32F
 
 from prehensile.behavior.state_machine import MachineStatus, Senses, StateMachine
 from prehensile.grasping import WSG50
-from prehensile.models.registry import find_model
-from prehensile.models.shapes.gltf import read_gltf
-from prehensile.perception.mesh import TriangleMesh
-from prehensile.perception.registration.known_object import KnownObject
 from prehensile.planning.arm import ArmModel
 from prehensile.scenes.clutter import PlacedObject, with_objects
 from prehensile.station.build import build
@@ -28,14 +24,13 @@ from prehensile.station.scenario import Scenario
 from prehensile.station.scenario_file import load_scenario
 from prehensile.tasks.clear_bin_moves import BinGeometry
 from prehensile.tasks.clear_bin_run import bin_geometry, intrinsics
-from prehensile.tasks.pose_pick import Finder, KnownShape, Look, Memory, PosePick, Sight
+from prehensile.tasks.pose_pick import Finder, Look, Memory, PosePick, Sight
 from prehensile.tasks.pose_pick_finder import CameraFinder
-from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_moves import TransferPlanner
+from prehensile.tasks.pose_pick_object import PreparedObject, prepare_object
 from prehensile.tasks.pose_pick_report import PosePickReport, SeenPose, adds
 from prehensile.tasks.pose_pick_scene import random_rest_pose
 
-MODEL = "mustard_bottle"
 BODY_POSES = "body_poses"
 GRIP_FORCE = 80.0  # N, the most that the hand can
 GOAL_YAW = math.radians(135.0)
@@ -87,17 +82,6 @@ class TrueFinder:
         return self.find(senses)
 
 
-def load_surface(model: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices (V, 3) in O [m] and faces (F, 3) of an embedded model's surface."""
-    path = find_model(model).path.with_suffix(".gltf")
-    vertices, faces, count = [], [], 0
-    for part in read_gltf(path):
-        vertices.append(part.mesh.vertices)
-        faces.append(part.mesh.faces + count)
-        count += len(part.mesh.vertices)
-    return np.concatenate(vertices), np.concatenate(faces)
-
-
 def load_pose_pick_scenario() -> Scenario:
     """The shipped station ``two_bins`` with noisy cameras, and a fourth one over the second bin."""
     return load_scenario("two_bins", data=_OVERLAY)
@@ -117,6 +101,7 @@ class PosePickRun:
         *,
         seed: int,
         X_WGoal: RigidTransform | None = None,
+        thing: PreparedObject | None = None,
         cheat: bool = False,
         scenario: Scenario | None = None,
         meshcat: Meshcat | None = None,
@@ -127,6 +112,7 @@ class PosePickRun:
             seed: of the scene, the cameras' noise and every choice of the task.
             X_WGoal: upright pose on the floor of ``bin1`` that the object is to have; in the
                 middle, turned by 135 degrees, if None.
+            thing: the object, which many runs may share; :func:`prepare_object`'s if None.
             cheat: tell the task the true pose instead of letting it look.
             scenario: a scenario like :func:`load_pose_pick_scenario`'s, which is the default.
             meshcat: where to show it; nothing is shown if None.
@@ -143,10 +129,11 @@ class PosePickRun:
         scenario = dc.replace(scenario, depth_noise=noise)
         world = make_robot_diagram(scenario)
         pick_bin, place_bin = (bin_geometry(world, name) for name in ("bin0", "bin1"))
-        vertices, faces = load_surface(MODEL)
+        thing = thing or prepare_object()
+        model, vertices, shape = thing.model, thing.vertices, thing.shape
         self._seed = seed
-        self.start = random_rest_pose(MODEL, vertices, pick_bin.X_WB, scenario, seed=seed)
-        placed = PlacedObject(f"{MODEL}_0", MODEL, self.start.X_WO)
+        self.start = random_rest_pose(model, vertices, pick_bin.X_WB, scenario, seed=seed)
+        placed = PlacedObject(f"{model}_0", model, self.start.X_WO)
         scenario = dc.replace(scenario, directives=with_objects(scenario.directives, [placed]))
         builder = DiagramBuilder()
         self.station: Diagram = builder.AddSystem(build(scenario, meshcat=meshcat))
@@ -154,23 +141,16 @@ class PosePickRun:
         self._plant = plant
         self._body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName(placed.name))
 
-        cloud_O = surface_cloud(vertices, faces)
-        p_OCm = self._body.default_com()
         self.X_WGoal = X_WGoal or default_goal(place_bin, vertices)
         check_goal(self.X_WGoal, place_bin, vertices)
-        half_turn = RotationMatrix.MakeZRotation(np.pi)
-        half_extent = 0.5 * np.ptp(vertices, axis=0)
-        shape = KnownShape(cloud_O, half_extent, [RotationMatrix(), half_turn])
         arm = ArmModel(world)
-        grasps = model_grasps(cloud_O, p_OCm, WSG50)
         walls = [*pick_bin.walls, *place_bin.walls]
-        planner = TransferPlanner(arm, grasps, vertices, WSG50, walls)
+        planner = TransferPlanner(arm, thing.grasps, vertices, WSG50, walls)
         finder: Finder = TrueFinder(int(self._body.index()))
         if not cheat:
-            known = KnownObject.from_mesh(TriangleMesh(vertices, faces))
             models = {name: intrinsics(config) for name, config in scenario.cameras.items()}
             finder = CameraFinder(
-                known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries, WSG50
+                thing.known, models, _FIND, _CHECK, pick_bin, place_bin, shape.symmetries, WSG50
             )
         task = PosePick(arm, planner, finder, shape, pick_bin, self.X_WGoal, WSG50, seed=seed)
         self.cameras = {name: intrinsics(scenario.cameras[name]).K for name in _FIND}
@@ -204,7 +184,7 @@ class PosePickRun:
         self.simulator = Simulator(self.diagram)
         ApplySimulatorConfig(scenario.simulator_config, self.simulator)
         self.simulator.set_target_realtime_rate(0.0)  # as fast as can be
-        self._model_points = cloud_O.points
+        self._model_points = shape.cloud_O.points
         self._wall = 0.0
         self._seen: list[SeenPose] = []
 
