@@ -23,8 +23,7 @@ from prehensile.tasks.pose_pick import (
     placement_error,
 )
 from prehensile.tasks.pose_pick_finder import believed
-from prehensile.tasks.pose_pick_grasps import model_grasps, surface_cloud
-from prehensile.tasks.pose_pick_moves import lying_poses
+from prehensile.tasks.pose_pick_grasps import lying_poses, model_grasps, surface_cloud
 from prehensile.tasks.pose_pick_object import MODEL, load_surface
 from prehensile.tasks.pose_pick_report import adds
 from prehensile.tasks.pose_pick_run import PosePickRun, check_goal, default_goal

@@ -21,7 +21,8 @@ from prehensile.perception.cloud import PointCloud
 from prehensile.planning.arm import ArmModel
 from prehensile.planning.moves import plan_move
 from prehensile.tasks.clear_bin_moves import BinGeometry, plan_nudge
-from prehensile.tasks.pose_pick_moves import Transfer, TransferPlanner, lying_poses
+from prehensile.tasks.pose_pick_grasps import lying_poses
+from prehensile.tasks.pose_pick_moves import Transfer, TransferPlanner
 
 
 @dc.dataclass(frozen=True)

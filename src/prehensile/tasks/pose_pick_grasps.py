@@ -1,13 +1,14 @@
-"""Grasps of an object whose shape is known, in its own frame, from every side.
+"""An object whose shape is known: its surface, its grasps from every side, how it may lie.
 
 Frames: O the object, G the hand, P the point between its pads (parallel to G).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from prehensile.grasping.candidates import Candidates
 from prehensile.grasping.grasp import GraspConfig
@@ -123,6 +124,25 @@ def model_grasps(
         )
         for i in kept
     ]
+
+
+def lying_poses(
+    center: NDArray[np.float64], half_thickness: float, rng: np.random.Generator, count: int = 8
+) -> Iterator[RigidTransform]:
+    """Poses in which the object lies on either broad side (its x axis vertical), turned at random.
+
+    Args:
+        center: (3,) of the floor below it, in W [m].
+        half_thickness: half the object's extent along x [m].
+        rng: of the turns.
+        count: how many turns.
+    """
+    p_WO = np.array(center) + [0, 0, half_thickness]
+    first = rng.uniform(0, 2 * np.pi)
+    for k in range(count):
+        turn = RotationMatrix.MakeZRotation(first + 2 * np.pi * k / count)
+        for side in (0.5 * np.pi, -0.5 * np.pi):
+            yield RigidTransform(turn @ RollPitchYaw(0, side, 0).ToRotationMatrix(), p_WO)
 
 
 def surface_cloud(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> PointCloud:

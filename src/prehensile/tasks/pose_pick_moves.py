@@ -3,13 +3,13 @@
 Frames: W world, O the object, G the hand.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Convex
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform
 
 from prehensile.grasping import ParallelGripper
 from prehensile.grasping.collision import hand_hits_boxes
@@ -389,25 +389,6 @@ class TransferPlanner:
             retreat = time_parameterize(back.path, slow, speed=0.3)
             return (carry.motion, lower, retreat, home, width), ""
         return None, reason
-
-
-def lying_poses(
-    center: NDArray[np.float64], half_thickness: float, rng: np.random.Generator, count: int = 8
-) -> Iterator[RigidTransform]:
-    """Poses in which the object lies on either broad side (its x axis vertical), turned at random.
-
-    Args:
-        center: (3,) of the floor below it, in W [m].
-        half_thickness: half the object's extent along x [m].
-        rng: of the turns.
-        count: how many turns.
-    """
-    p_WO = np.array(center) + [0, 0, half_thickness]
-    first = rng.uniform(0, 2 * np.pi)
-    for k in range(count):
-        turn = RotationMatrix.MakeZRotation(first + 2 * np.pi * k / count)
-        for side in (0.5 * np.pi, -0.5 * np.pi):
-            yield RigidTransform(turn @ RollPitchYaw(0, side, 0).ToRotationMatrix(), p_WO)
 
 
 def _alike(X_OA: RigidTransform, X_OB: RigidTransform) -> bool:
