@@ -11,6 +11,9 @@
 namespace prehensile {
 namespace {
 
+/// The say of an image that sees only free space at a voxel, at least.
+constexpr double kSeenThrough = 0.01;
+
 /// Of two slopes the one nearer to flat, 0 if they disagree in sign or one is not known: no slope
 /// reaches across an edge of depth.
 double Flatter(double a, double b) {
@@ -101,8 +104,13 @@ void IntegrateDepth(const DepthImageView& image, const Eigen::Matrix4d& X_WB, do
           float& mean = volume.distances[row + k];
           float& weight = volume.weights[row + k];
           const double here = std::min(distance, truncation);
-          const double nearness = std::max(1.0 - std::abs(here) / truncation, 0.1);
-          const auto say = static_cast<float>(cosine * nearness * nearness);
+          // What lies far behind a voxel is no news to one that sees a surface close before it. But
+          // what saw through a voxel outvotes what has it close behind a surface, in its shadow.
+          const double nearness = 1.0 - std::abs(here) / truncation;
+          const double trust = here >= 0 ? std::max(nearness * nearness, kSeenThrough)
+                                         : 4 * kSeenThrough * nearness * nearness;
+          const auto say = static_cast<float>(cosine * trust);
+          if (!(say > 0)) continue;
           weight += say;
           mean += (static_cast<float>(here) - mean) * (say / weight);
         }

@@ -24,9 +24,10 @@ struct VolumeView {
 /// A voxel that projects onto a pixel with a return is compared with the return along the ray; what
 /// lies between them, times the cosine of incidence, is the distance from the plane seen there.
 /// In front of it, space is free and the distance is the truncation; further behind it than the
-/// truncation, the image says nothing. Answers are weighed by the cosine, and the more the nearer
-/// the surface: what an image sees far behind a voxel is no news to one that sees a surface close
-/// by.
+/// truncation, the image says nothing. Answers are weighed by the cosine,
+/// and the more the nearer the surface: what an image sees far behind a voxel is no news to one
+/// that sees a surface close before it. But what saw through a voxel outvotes what has it behind a
+/// surface, where that one's shadow begins.
 ///
 /// @param image its rays must be null (a pinhole); colours are not used.
 /// @param X_WB pose of the volume's frame.
