@@ -85,8 +85,10 @@ void TestRefine() {
     const std::vector<double> points = MakePoints(n);
     const auto poses = RefinePoses(points.data(), nullptr, n, field, {start, start}, {}, 2);
     Check(poses[0].cost == poses[1].cost || !poses[1].is_finalist, "same start, same end");
-    Check(poses[0].residuals.size() == static_cast<std::size_t>(n), "a residual for each point");
+    Check(poses[0].is_inlier.size() == static_cast<std::size_t>(n), "a judgement for each point");
     if (n < 500) continue;
+    Check(poses[0].num_inliers == static_cast<std::size_t>(n) && poses[0].inlier_rms < 1e-4,
+          "all are inliers");
     Check(poses[0].converged, "converges");
     const Eigen::Isometry3d& X = poses[0].X_WO;
     Check(X.translation().norm() < 2e-4 && Eigen::AngleAxisd(X.linear()).angle() < 5e-3,

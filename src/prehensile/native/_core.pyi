@@ -584,7 +584,11 @@ RefinedPose = tuple[
     NDArray[np.float64],
     float,
     float,
-    NDArray[np.float32],
+    NDArray[np.float64],
+    float,
+    NDArray[np.uint8],
+    int,
+    float,
 ]
 
 def refine_poses(
@@ -604,10 +608,12 @@ def refine_poses(
     max_coarse_iterations: int,
     max_iterations: int,
     tolerance: float,
+    inlier_distance: float,
     num_threads: int,
 ) -> list[RefinedPose]:
     """One for each start: X_WO, cost, iterations on few points, on all, converged, finalist,
-    information, sum of squares, sum of weights, residuals."""
+    information, sum of squares, sum of weights; of a finalist mean and size of the scene, inliers,
+    their number and root mean square distance."""
 
 # Depth images (prehensile/depth_fusion.h). A view is (depth (H, W) float32 or uint16, its unit [m],
 # (fx, fy, cx, cy), rays (2, H, W) float32 or None, X_WC, colors (H, W, 3) uint8 or None); limits are

@@ -239,6 +239,7 @@ def _refine(
         max_coarse_iterations=12,
         max_iterations=1 if coarse else 10,
         tolerance=1e-5,
+        inlier_distance=3 * scale,
         num_threads=num_threads,
     )
     fits = [

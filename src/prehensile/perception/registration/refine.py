@@ -181,11 +181,10 @@ def _refine(
         config.max_coarse_iterations,
         config.max_iterations,
         config.tolerance,
+        _inlier_distance(config),
         num_threads,
     )
-    mean = scene.points.mean(axis=0)
-    length = float(np.sqrt(np.square(scene.points - mean).sum(axis=1).mean()))
-    results = [_result(answer, config, mean, length) if answer[5] else None for answer in answers]
+    results = [_result(answer, config) if answer[5] else None for answer in answers]
     costs = np.array([answer[1] for answer in answers])
     finalists = [i for i, result in enumerate(results) if result is not None]
     winner = min(finalists, key=lambda i: costs[i])
@@ -207,25 +206,26 @@ def _refine(
     return RefinedPoses(best, results, costs)
 
 
-def _result(
-    answer: "_core.RefinedPose", config: RefineConfig, mean: NDArray[np.float64], length: float
-) -> RegistrationResult:
+def _inlier_distance(config: RefineConfig) -> float:
+    return 3 * config.scale if config.inlier_distance is None else config.inlier_distance
+
+
+def _result(answer: "_core.RefinedPose", config: RefineConfig) -> RegistrationResult:
     """Judges one finalist."""
-    X, _, coarse, fine, converged, _, information, sum_squares, sum_weights, residuals = answer
+    X, _, coarse, fine, converged, _, information, sum_squares, sum_weights = answer[:9]
+    mean, length, inliers, count, residual = answer[9:]
+    inliers = inliers.view(np.bool_)
     X_WO = RigidTransform(RotationMatrix.ProjectToRotationMatrix(X[:3, :3]), X[:3, 3])
-    limit = 3 * config.scale if config.inlier_distance is None else config.inlier_distance
-    inliers = np.abs(residuals) <= limit
-    count = int(inliers.sum())
-    residual = float(np.sqrt(np.square(residuals[inliers]).mean())) if count else np.nan
     status, message = RegistrationStatus.SUCCESS, ""
     covariance = free = None
     if sum_weights > _FEWEST_POINTS:
         variance = sum_squares / (sum_weights - _FEWEST_POINTS)
         covariance, free = uncertainty_about(
-            information, variance, max(length, 1e-9), X_WO.translation() - mean
+            information, variance, max(length, 1e-9), X[:3, 3] - mean
         )
     if count < config.min_overlap * len(inliers):
         status = RegistrationStatus.LOW_OVERLAP
+        limit = _inlier_distance(config)
         message = f"{count} of {len(inliers)} points lie within {limit:.4g} m of the model"
     elif free is None or len(free):
         status = RegistrationStatus.DEGENERATE
