@@ -10,18 +10,16 @@ namespace {
 
 using Lanes = float __attribute__((vector_size(4 * kRefineLanes)));
 
-[[gnu::always_inline]] inline void Load(const float *at, Lanes *lanes) {
+[[gnu::always_inline]] inline void Load(const float* at, Lanes* lanes) {
   __builtin_memcpy(lanes, at, sizeof(*lanes));
 }
 
-void LookUpAll(const FieldView<float> &field, const RefinePoints &points,
-               std::size_t n, const float *R, const float *t,
-               float min_normal_cosine, const RefineRows &rows) {
+void LookUpAll(const FieldView<float>& field, const RefinePoints& points, std::size_t n,
+               const float* R, const float* t, float min_normal_cosine, const RefineRows& rows) {
   // Copies: nothing that is written below can change them.
   const FieldView<float> grid = field;
   float turn[9];
-  for (int k = 0; k < 9; ++k)
-    turn[k] = R[k];
+  for (int k = 0; k < 9; ++k) turn[k] = R[k];
   const float shift[3] = {t[0], t[1], t[2]};
   constexpr std::size_t kBlock = 64;
   for (std::size_t begin = 0; begin < n; begin += kBlock) {
@@ -29,10 +27,9 @@ void LookUpAll(const FieldView<float> &field, const RefinePoints &points,
     std::int32_t node[kBlock];
     float at[3][kBlock], within[3][kBlock], beyond[3][kBlock];
     for (std::size_t k = 0; k < count; ++k) {
-      const float x = points.x[begin + k], y = points.y[begin + k],
-                  z = points.z[begin + k];
+      const float x = points.x[begin + k], y = points.y[begin + k], z = points.z[begin + k];
       for (int axis = 0; axis < 3; ++axis) {
-        const float *const row = turn + 3 * axis;
+        const float* const row = turn + 3 * axis;
         at[axis][k] = row[0] * x + row[1] * y + row[2] * z + shift[axis];
       }
       const FieldCell<float> cell = Locate(grid, at[0][k], at[1][k], at[2][k]);
@@ -58,8 +55,7 @@ void LookUpAll(const FieldView<float> &field, const RefinePoints &points,
       rows.valid[i] = points.present[i];
     }
   }
-  if (!points.nx)
-    return;
+  if (!points.nx) return;
   for (std::size_t i = 0; i < n; ++i) {
     const float x = points.nx[i], y = points.ny[i], z = points.nz[i];
     const float cosine = (R[0] * x + R[1] * y + R[2] * z) * rows.gx[i] +
@@ -70,8 +66,8 @@ void LookUpAll(const FieldView<float> &field, const RefinePoints &points,
 }
 
 template <RobustLoss kLoss>
-RefineCost Weigh(double scale, float max_distance, const float *r,
-                 const float *valid, std::size_t n, float *weights) {
+RefineCost Weigh(double scale, float max_distance, const float* r, const float* valid,
+                 std::size_t n, float* weights) {
   const double most = static_cast<double>(max_distance) * max_distance;
   double sums[kRefineLanes] = {};
   double counted[kRefineLanes] = {};
@@ -83,8 +79,7 @@ RefineCost Weigh(double scale, float max_distance, const float *r,
       const double counts = valid[i + lane];
       counted[lane] += counts;
       sums[lane] += counts * Loss(kLoss, kept, scale);
-      weights[i + lane] = static_cast<float>(
-          r2 <= most ? counts * Weight(kLoss, r2, scale) : 0.0);
+      weights[i + lane] = static_cast<float>(r2 <= most ? counts * Weight(kLoss, r2, scale) : 0.0);
     }
   }
   RefineCost cost{};
@@ -95,29 +90,27 @@ RefineCost Weigh(double scale, float max_distance, const float *r,
   return cost;
 }
 
-RefineCost WeighAny(RobustLoss loss, double scale, float max_distance,
-                    const float *r, const float *valid, std::size_t n,
-                    float *weights) {
+RefineCost WeighAny(RobustLoss loss, double scale, float max_distance, const float* r,
+                    const float* valid, std::size_t n, float* weights) {
   const auto weigh = [&] {
     switch (loss) {
-    case RobustLoss::kHuber:
-      return Weigh<RobustLoss::kHuber>;
-    case RobustLoss::kTukey:
-      return Weigh<RobustLoss::kTukey>;
-    case RobustLoss::kGemanMcClure:
-      return Weigh<RobustLoss::kGemanMcClure>;
-    case RobustLoss::kTruncated:
-      return Weigh<RobustLoss::kTruncated>;
-    case RobustLoss::kLeastSquares:
-      break;
+      case RobustLoss::kHuber:
+        return Weigh<RobustLoss::kHuber>;
+      case RobustLoss::kTukey:
+        return Weigh<RobustLoss::kTukey>;
+      case RobustLoss::kGemanMcClure:
+        return Weigh<RobustLoss::kGemanMcClure>;
+      case RobustLoss::kTruncated:
+        return Weigh<RobustLoss::kTruncated>;
+      case RobustLoss::kLeastSquares:
+        break;
     }
     return Weigh<RobustLoss::kLeastSquares>;
   }();
   return weigh(scale, max_distance, r, valid, n, weights);
 }
 
-void Sum(const RefineRows &rows, const float *weights, std::size_t n,
-         RefineSums *sums) {
+void Sum(const RefineRows& rows, const float* weights, std::size_t n, RefineSums* sums) {
   // Single precision within a block, double across blocks.
   constexpr std::size_t kBlock = 512;
   *sums = RefineSums{};
@@ -135,26 +128,22 @@ void Sum(const RefineRows &rows, const float *weights, std::size_t n,
       Load(rows.gz + i, &gz);
       Load(weights + i, &w);
       Load(rows.r + i, &r);
-      const Lanes J[6] = {
-          py * gz - pz * gy, pz * gx - px * gz, px * gy - py * gx, gx, gy, gz};
+      const Lanes J[6] = {py * gz - pz * gy, pz * gx - px * gz, px * gy - py * gx, gx, gy, gz};
       for (int a = 0, at = 0; a < 6; ++a) {
         const Lanes wJ = w * J[a];
         gradient[a] += wJ * r;
-        for (int b = 0; b <= a; ++b, ++at)
-          information[at] += wJ * J[b];
+        for (int b = 0; b <= a; ++b, ++at) information[at] += wJ * J[b];
       }
     }
     for (int lane = 0; lane < kRefineLanes; ++lane) {
-      for (int at = 0; at < 21; ++at)
-        sums->information[at] += information[at][lane];
-      for (int a = 0; a < 6; ++a)
-        sums->gradient[a] += gradient[a][lane];
+      for (int at = 0; at < 21; ++at) sums->information[at] += information[at][lane];
+      for (int a = 0; a < 6; ++a) sums->gradient[a] += gradient[a][lane];
     }
   }
 }
 
-} // namespace
+}  // namespace
 
 extern const RefineKernel kRefine{LookUpAll, WeighAny, Sum};
 
-} // namespace prehensile::internal::PREHENSILE_SIMD
+}  // namespace prehensile::internal::PREHENSILE_SIMD

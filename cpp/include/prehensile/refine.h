@@ -83,11 +83,9 @@ struct RefinedPose {
 /// @param X_WO starts.
 /// @return one for each start, in order.
 /// @throws std::invalid_argument naming the argument.
-std::vector<RefinedPose> RefinePoses(const double *points,
-                                     const double *normals, std::size_t n,
-                                     const DistanceField &field,
-                                     const std::vector<Eigen::Isometry3d> &X_WO,
-                                     const RefineOptions &options,
-                                     int num_threads);
+std::vector<RefinedPose> RefinePoses(const double* points, const double* normals, std::size_t n,
+                                     const DistanceField& field,
+                                     const std::vector<Eigen::Isometry3d>& X_WO,
+                                     const RefineOptions& options, int num_threads);
 
-} // namespace prehensile
+}  // namespace prehensile
