@@ -128,10 +128,9 @@ nb::object Nodes(const DistanceField& field) {
       nb::ndarray<nb::numpy, const float>(&nodes.data()->distance, {nodes.size(), 4}, owner));
 }
 
-/// What came of one start, as (pose, cost, iterations on few points, on all,
-/// converged, finalist, information, sum of squares, sum of weights; of a
-/// finalist mean and size of the scene, inliers, their number and root mean
-/// square distance).
+/// What came of one start, as (pose, cost, iterations on few points, on all, converged, finalist,
+/// information, sum of squares, sum of weights; of a finalist mean and size of the scene, inliers,
+/// their number and root mean square distance).
 nb::tuple Answer(const RefinedPose& pose) {
   ArrayResult<> X{4, 4}, information{6, 6}, centre{3};
   ArrayResult<std::uint8_t> inliers{pose.is_inlier.size()};

@@ -27,8 +27,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// A point on the wrong side of its normal counts as one so many scales away.
 constexpr double kMismatch = 3;
-/// Least damping, relative to the mean eigenvalue: what keeps a free motion
-/// where it is.
+/// Least damping, relative to the mean eigenvalue: what keeps a free motion where it is.
 constexpr double kLeastDamping = 1e-6;
 constexpr double kMostDamping = 1e4;
 /// The first iterations end when a step is below this part of the loss's scale.
@@ -57,8 +56,8 @@ Matrix3d Rotation(const Vector3d& w) {
   return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
 }
 
-/// The scene by coordinate, relative to its mean, strewn so that its first
-/// points are spread over all of it.
+/// The scene by coordinate, relative to its mean, strewn so that its first points are spread over
+/// all of it.
 class Scene {
  public:
   Scene(const double* points, const double* normals, std::size_t n)
@@ -66,9 +65,8 @@ class Scene {
     mean_.setZero();
     for (std::size_t i = 0; i < n; ++i) mean_ += Eigen::Map<const Vector3d>(points + 3 * i);
     mean_ /= static_cast<double>(n);
-    // Every row once, by steps of the golden section of n: neighbours in a
-    // cloud or an image come far apart, and any first few are about evenly
-    // spread.
+    // Every row once, by steps of the golden section of n: neighbours in a cloud or an image come
+    // far apart, and any first few are about evenly spread.
     auto step = static_cast<std::size_t>(0.6180339887498949 * static_cast<double>(n));
     step = std::max<std::size_t>(step, 1);
     while (std::gcd(step, n) != 1) ++step;
@@ -111,8 +109,8 @@ class Scene {
   double radius_ = 0;
 };
 
-/// Where the scene is: q = R s + t of a point s of the scene relative to its
-/// mean, in O relative to the centre of the field.
+/// Where the scene is: q = R s + t of a point s of the scene relative to its mean, in O relative to
+/// the centre of the field.
 struct Placement {
   Matrix3d R;
   Vector3d t;
@@ -196,8 +194,7 @@ class Refiner {
           *at = next;
           std::swap(rows_[0], rows_[1]);
           damping = std::max(0.1 * damping, kLeastDamping);
-          // With the same scale and points the weights are those of the next
-          // iteration.
+          // With the same scale and points the weights are those of the next iteration.
           cost = final_scale && options_.kept_fraction >= 1 ? next_cost : -1;
         } else {
           if (moved < tolerance || damping > kMostDamping) break;
@@ -216,13 +213,12 @@ class Refiner {
     return Cost(rows_[0], options_.scale, MaxDistance(rows_[0], options_.scale));
   }
 
-  /// What all points know about the pose, at which FinalCost() was asked for
-  /// last.
+  /// What all points know about the pose, at which FinalCost() was asked for last.
   void Information(const Placement& at, RefinedPose* pose) {
     internal::RefineSums sums;
     kernel_.sum(rows_[0], weights_, padded_, &sums);
-    // From motions about the centre in O to motions about the scene's mean in
-    // W: J of rotation becomes (q - t) × g, and all turn.
+    // From motions about the centre in O to motions about the scene's mean in W: J of rotation
+    // becomes (q - t) × g, and all turn.
     Matrix6d A = Matrix6d::Identity();
     A.topRightCorner<3, 3>() = -Skew(at.t);
     Matrix6d turn = Matrix6d::Zero();
@@ -262,8 +258,7 @@ class Refiner {
                     static_cast<float>(options_.min_normal_cosine), rows);
   }
 
-  /// Beyond which points do not count: by the options and by the part that is
-  /// kept.
+  /// Beyond which points do not count: by the options and by the part that is kept.
   double MaxDistance(const internal::RefineRows& rows, double scale) {
     const double given = options_.max_distance * (scale / options_.scale);
     if (options_.kept_fraction >= 1) return given;

@@ -1,5 +1,5 @@
-// The inner loops of refinement, compiled once per SIMD level. No library code
-// here (see cpp/CMakeLists.txt).
+// The inner loops of refinement, compiled once per SIMD level. No library code here (see
+// cpp/CMakeLists.txt).
 
 #include "refine_kernel.h"
 
