@@ -135,7 +135,7 @@ ax.legend(loc="upper right")
 
 def frames():
     """The model, step by step; the later steps are smaller and go by faster."""
-    for k in [*range(0, 12), *range(12, len(poses), 6)]:
+    for k in [*range(12), *range(12, len(poses), 6)]:
         R, p = poses[k]
         dots.set_data_3d(*(model[::3] @ R.T + p).T)
         ax.set_title(f"step {k}: {1000 * errors[k]:.2f} mm")
