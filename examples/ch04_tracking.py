@@ -125,6 +125,7 @@ assert (status[free] == TrackingStatus.TRACKING.value).all()
 assert np.median(position[free]) < 0.003
 assert np.median(angle[free]) < 2
 assert (status[away][2:] == TrackingStatus.LOST.value).all()
+assert (status == TrackingStatus.OCCLUDED.value).sum() >= 3
 assert (status[-10:] == TrackingStatus.TRACKING.value).all()
 assert position[-10:].max() < 0.01
 
