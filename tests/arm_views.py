@@ -33,7 +33,9 @@ def links(first: int = 0) -> tuple[Body, ...]:
     bodies = []
     for k in range(first, 8):
         mesh = read_mesh(folder / f"link_{k}.gltf")
-        field = DistanceField.from_mesh(mesh, spacing=0.01, margin=0.05, signed=False)
+        # The flange is all that tells of joint 6: its field must be true.
+        spacing = 0.004 if k >= 6 else 0.01
+        field = DistanceField.from_mesh(mesh, spacing, margin=0.05, signed=False)
         bodies.append(Body.from_mesh(mesh, field, num_samples=150))
     return tuple(bodies)
 

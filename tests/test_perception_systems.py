@@ -140,11 +140,10 @@ def test_cloud_is_that_of_fuse_and_lies_on_the_object(falling):
     distances = bottle().field.at((X_WO.inverse() @ high.T).T).distances
     assert np.median(np.abs(distances)) < 0.002
     # In time with what the cameras see.
-    station_context = falling.station.GetMyContextFromRoot(context)
     plant = falling.station.plant()
     body = plant.GetBodyByName("base_link", plant.GetModelInstanceByName("bottle"))
     away = RigidTransform([0.57, 0.05, 2.0])
-    plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(station_context), body, away)
+    plant.SetFreeBodyPose(plant.GetMyMutableContextFromRoot(context), body, away)
     cloud = falling.fusion.GetOutputPort("cloud").Eval(fusion_context)
     assert (cloud.points[:, 2] < 0.22).all()
 

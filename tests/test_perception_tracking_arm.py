@@ -57,8 +57,8 @@ def test_bias_of_the_encoders_is_found(tracked):
         assert state.status is TrackingStatus.TRACKING
         np.testing.assert_allclose(state.q + state.bias, q + BIAS)
     state, q = tracked[-1]
-    assert np.degrees(np.abs(state.q - q))[:6].max() < 0.5
-    np.testing.assert_allclose(state.bias[:6], BIAS[:6], atol=np.radians(0.5))
+    assert np.degrees(np.abs(state.q - q))[:6].max() < 0.25
+    np.testing.assert_allclose(state.bias[:6], BIAS[:6], atol=np.radians(0.25))
 
 
 def test_joint_that_turns_a_round_flange_is_known_to_be_unknown(tracked):
