@@ -85,7 +85,8 @@ fig.tight_layout()
 
 def frames():
     """Draws both runs side by side, a step at a time."""
-    for k in range(max(len(result.history) for result, _ in runs)):
+    last = max(len(result.history) for result, _ in runs) - 1
+    for k in [*range(6), *range(6, last, 2), last]:
         for ax, tangle, outline, (result, sums) in zip(axes, tangles, outlines, runs, strict=True):
             step = result.history[min(k, len(result.history) - 1)]
             at = moved(model, step.X_WO)
@@ -98,7 +99,7 @@ def frames():
         yield fig
 
 
-save_animation(frames(), "two_runs", period=0.2)
+save_animation(frames(), "two_runs", period=0.3)
 plt.close(fig)
 
 fig, ax = plt.subplots(figsize=(6, 3.2))
