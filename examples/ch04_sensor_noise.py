@@ -88,7 +88,8 @@ angle = incidence(np.where(np.isfinite(ideal) & (ideal > 0), 1 / ideal, 0), came
 steep = known & (angle > np.deg2rad(83))
 calm = known & (angle < np.deg2rad(60))
 calm[:, :120] = False  # The left band, which the right imager does not see.
-jump = np.abs(np.diff(ideal, axis=1, append=ideal[:, -1:])) > 0.05
+near = np.minimum(ideal, 5)  # The nothing beyond the table is infinitely far.
+jump = np.abs(np.diff(near, axis=1, append=near[:, -1:])) > 0.05
 edge = known & (jump | np.roll(jump, 1, axis=1))
 rate = {
     "grazed": missed[steep].mean(),
