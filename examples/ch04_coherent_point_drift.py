@@ -114,7 +114,7 @@ volume = float(np.prod(np.ptp(scene, axis=0)))
 
 def frames():
     """Draws a step at a time."""
-    for k in [*range(0, 36, 2), 40, 50, 60]:
+    for k in [*range(0, 32, 2), 35, 60]:
         X, sigma = history[k]
         at = moved(model, X)
         C = weights(scene, at, sigma, 0.3, volume)
