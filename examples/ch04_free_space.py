@@ -53,7 +53,8 @@ info = CameraInfo(320, 240, 300.0, 300.0, 159.5, 119.5)
 X_WC = look_at([0.0, -0.55, 0.35], [0.0, 0.0, 0.04])
 rng = np.random.default_rng(0)
 depth = render_depth(diagram, context, X_WC, info)
-depth += 0.001 * rng.standard_normal(depth.shape, dtype=np.float32) * depth**2
+seen = np.isfinite(depth)
+depth[seen] += 0.001 * rng.standard_normal(seen.sum(), dtype=np.float32) * depth[seen] ** 2
 view = DepthView(depth, PosedCamera(CameraModel.from_drake(info), X_WC))
 
 # %% [markdown]
