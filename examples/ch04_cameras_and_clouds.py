@@ -216,8 +216,7 @@ for guess, mask in zip(predicted, coverage, strict=True):
 # A cloud says where something is; the depth image says in addition that between the camera and
 # there is nothing. A grid of voxels keeps that: *occupied* at the surface, *free* where rays went
 # through, *unknown* behind it. Some of the unknown can only be cleared by moving a camera; the
-# inside of the bottle never. (The specks beside it come from rays that graze its rim, where the
-# plane that a pixel sees is poorly known.)
+# inside of the bottle never.
 
 # %%
 depth_views = [DepthView(d, posed) for d, posed in zip(depths, cameras, strict=True)]
