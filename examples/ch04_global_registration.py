@@ -112,7 +112,7 @@ save_figure(fig, "scene")
 # Two points with normals have four numbers that no motion changes: their distance, the angles
 # between it and the normals, and the angle between the normals. A table holds all pairs of the
 # model by these. A pair of the scene looks up the pairs of the model that it may be, and each of
-# them says where the model would lie. Poses with many votes, the best of some thousand proposals,
+# them says where the model would lie. Poses with many votes, the best of thousands of proposals,
 # are good starts, whatever else is in the scene.
 
 # %%
