@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from prehensile.perception.body_evidence import Body, EvidenceConfig
+from prehensile.perception.camera_model import PosedCamera
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.free_space import DepthView
 from prehensile.perception.tracking import (
@@ -189,6 +190,59 @@ def test_pixels_to_ignore_do_not_count(hammer):
     believing = track_object(hammer, state, DT, DepthView(wrong, CAMERA), config=config)
     assert error(ignoring, swinging(0))[0] < 0.002
     assert error(believing, swinging(0))[0] > 2 * error(ignoring, swinging(0))[0]
+
+
+CARTON_MESH = boxes_mesh([((0, 0, 0), (0.06, 0.1, 0.19))])
+
+
+@pytest.fixture(scope="module")
+def carton() -> Body:
+    return Body.from_mesh(CARTON_MESH, DistanceField.from_mesh(CARTON_MESH, 0.004, 0.04))
+
+
+def slide(
+    carton: Body, camera: PosedCamera, images: int, config: TrackerConfig
+) -> list[tuple[ObjectState, float]]:
+    """States and distances from the truth of a carton that slides on the table z = 0."""
+    R_WC, p_WC = camera.X_WC.rotation().matrix(), camera.X_WC.translation()
+    rays = np.moveaxis(np.array(camera.model.rays), 0, -1)
+    down = -(rays @ R_WC[2, :2] + R_WC[2, 2])
+    table = np.where(down > 0, p_WC[2] / np.where(down > 0, down, 1), np.inf)
+
+    def path(t: float) -> RigidTransform:
+        turn = RotationMatrix.MakeZRotation(0.4 * np.sin(3 * t))
+        return RigidTransform(turn, [0.1 * np.sin(4 * t), 0.03 * t - 0.05, 0.095])
+
+    rng = np.random.default_rng(0)
+    state = start_tracking(path(0.0))
+    history = []
+    for k in range(1, images + 1):
+        X_WO = path(k * DT)
+        depth = np.minimum(render_depth(camera, [(carton.field, X_WO)], background=9.0), table)
+        depth += NOISE * rng.standard_normal(depth.shape) * depth**2
+        state = track_object(carton, state, k * DT, DepthView(depth, camera), config=config)
+        history.append((state, error(state, X_WO)[0]))
+    return history
+
+
+def test_table_does_not_draw_on_what_slides_on_it(carton):
+    """Points of the table beside a carton are not the carton's, though nobody says so."""
+    camera = d415(look_at((0.4, -0.3, 0.6), (0, 0, 0)))
+    blind = TrackerConfig(evidence=EvidenceConfig(max_normal_angle=np.pi))
+    errors, without = (
+        np.array([distance for _, distance in slide(carton, camera, 8, config)])
+        for config in (TrackerConfig(), blind)
+    )
+    assert errors.max() < 0.0005
+    assert np.median(without) > 1.5 * np.median(errors)
+
+
+def test_carton_is_followed_from_above(carton):
+    """Little but its top can be seen: only the top's edges say where it is on the table."""
+    camera = d415(look_at((0.15, -0.1, 0.75), (0, 0, 0)))
+    history = slide(carton, camera, 16, TrackerConfig())
+    assert all(state.status is TrackingStatus.TRACKING for state, _ in history)
+    assert max(distance for _, distance in history) < 0.005
 
 
 def test_prediction_moves_with_the_velocity_and_grows_unsure():

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "losses.h"
 #include "vectors.h"
 
 namespace prehensile {
@@ -23,7 +24,9 @@ struct Region {
 };
 
 void Check(const DepthView& view) {
-  Require(view.width >= 1 && view.height >= 1, "depth: must have pixels");
+  constexpr int kMost = 1 << 15;
+  Require(view.width >= 1 && view.height >= 1 && view.width <= kMost && view.height <= kMost,
+          "depth: must have from 1 to 32768 rows and columns");
   Require(view.fx > 0 && view.fy > 0, "K: focal lengths must be positive");
 }
 
@@ -169,34 +172,6 @@ void Mirror(std::vector<BodyTerm>* terms) {
   }
 }
 
-/// Of a squared residual: its weight and its loss.
-struct Weighted {
-  double weight;
-  double loss;
-};
-
-Weighted Weigh(RobustLoss loss, double r2, double c2) {
-  switch (loss) {
-    case RobustLoss::kLeastSquares:
-      return {1, r2};
-    case RobustLoss::kHuber:
-      if (r2 <= c2) return {1, r2};
-      return {std::sqrt(c2 / r2), 2 * std::sqrt(c2 * r2) - c2};
-    case RobustLoss::kTukey: {
-      if (r2 >= c2) return {0, c2 / 3};
-      const double rest = 1 - r2 / c2;
-      return {rest * rest, c2 / 3 * (1 - rest * rest * rest)};
-    }
-    case RobustLoss::kGemanMcClure: {
-      const double part = c2 / (c2 + r2);
-      return {part * part, part * r2};
-    }
-    case RobustLoss::kTruncated:
-      return r2 <= c2 ? Weighted{1, r2} : Weighted{0, c2};
-  }
-  return {1, r2};
-}
-
 /// The way sideways, in the image, from a pixel to the nearest one where something was measured no
 /// further than z: its length [m], less one and a half pixels for what pixels cannot tell.
 /// Infinite if there is none within the radius.
@@ -307,7 +282,6 @@ std::vector<BodyTerm> SurfaceTerms(const double* points, std::size_t n,
   std::vector<Box> boxes;
   for (const TrackedBody& body : bodies) boxes.emplace_back(body);
   std::vector<BodyTerm> terms(bodies.size());
-  const double c2 = loss_scale * loss_scale;
   for (std::size_t k = 0; k < n; ++k) {
     const Vector3d p_W = Eigen::Map<const Vector3d>(points + 3 * k);
     DistanceField::Value nearest{kInfinity, Vector3d::Zero()};
@@ -326,14 +300,13 @@ std::vector<BodyTerm> SurfaceTerms(const double* points, std::size_t n,
     }
     if (bodies.empty()) break;
     const double r = nearest.distance;
-    const Weighted weighted = Weigh(loss, r * r, c2);
+    const double weight = internal::Weight(loss, r * r, loss_scale);
     BodyTerm& term = terms[body];
-    term.cost += weighted.loss;
-    term.weight += weighted.weight;
-    term.weighted_squares += weighted.weight * r * r;
-    if (weighted.weight > 0) {
-      Accumulate(p_W - bodies[body].p_WB, bodies[body].R_WB * nearest.gradient, r, weighted.weight,
-                 &term);
+    term.cost += internal::Loss(loss, r * r, loss_scale);
+    term.weight += weight;
+    term.weighted_squares += weight * r * r;
+    if (weight > 0) {
+      Accumulate(p_W - bodies[body].p_WB, bodies[body].R_WB * nearest.gradient, r, weight, &term);
     }
   }
   Mirror(&terms);
@@ -389,7 +362,8 @@ std::vector<SampleCounts> AddFreeSpaceTerms(const std::vector<DepthView>& views,
           ++counts[i].seen;
           continue;
         }
-        ++counts[i].in_free;
+        // Near an edge, it is a matter of refining the pose.
+        ++(way <= options.margin ? counts[i].seen : counts[i].in_free);
         violation = std::min(violation, options.max_violation);
         BodyTerm& term = (*terms)[i];
         term.cost += weight * violation * violation;

@@ -101,7 +101,7 @@ struct FreeSpaceOptions {
 /// What the images say of a body's samples that face a camera.
 struct SampleCounts {
   std::int64_t facing = 0;    ///< In the image, on the near side.
-  std::int64_t seen = 0;      ///< Measured where they should be, up to the margin.
+  std::int64_t seen = 0;      ///< Measured where they should be, or aside, up to the margin.
   std::int64_t in_free = 0;   ///< Where the camera saw through.
   std::int64_t occluded = 0;  ///< Behind something.
   std::int64_t unknown = 0;   ///< No measurement there, or ignored pixels.
