@@ -1,5 +1,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -57,9 +58,10 @@ internal::NearestFeaturesKernel NearestKernel() {
   return internal::baseline::kNearestFeatures;
 }
 
+/// Below 1e70, so that products of a few are finite.
 void RequireFinite(const double* values, std::size_t n, const char* name) {
   for (std::size_t i = 0; i < n; ++i) {
-    if (!std::isfinite(values[i])) {
+    if (!(std::abs(values[i]) < 1e70)) {
       throw std::invalid_argument(std::string(name) + ": must be finite");
     }
   }
@@ -72,6 +74,7 @@ void Fpfh(const double* points, const double* normals, std::size_t n, double rad
   if (!(radius > 0) || !std::isfinite(radius)) {
     throw std::invalid_argument("radius: must be positive and finite");
   }
+  RequireFinite(points, 3 * n, "points");
   RequireFinite(normals, 3 * n, "normals");
   const KdTree tree(points, n);
   std::vector<char> known(n);
@@ -83,6 +86,8 @@ void Fpfh(const double* points, const double* normals, std::size_t n, double rad
   };
   std::vector<std::vector<Neighbor>> neighbors(n);
   std::vector<float> own(n * kFpfhSize, 0.0f);
+  constexpr std::size_t kMostPairs = std::size_t{1} << 28;  // Two gigabytes.
+  std::atomic<std::size_t> num_pairs = 0;
   constexpr std::size_t kRowsPerThread = 128;
   internal::RunShares(n, kRowsPerThread, num_threads, [&](std::size_t begin, std::size_t end) {
     std::vector<std::int32_t> indices;
@@ -91,12 +96,15 @@ void Fpfh(const double* points, const double* normals, std::size_t n, double rad
       if (!known[i]) continue;
       const Vector3d p = Row(points, i), normal = Row(normals, i);
       tree.WithinRadius(p.data(), radius, &indices, &squared_distances);
+      if ((num_pairs += indices.size()) > kMostPairs) {
+        throw std::invalid_argument("radius: too large for so dense a cloud; down-sample it first");
+      }
       neighbors[i].reserve(indices.size());
       int counts[kFpfhSize] = {};
       for (std::size_t k = 0; k < indices.size(); ++k) {
         const std::int32_t j = indices[k];
         // A point at the same place has no direction, and is no neighbour.
-        if (!known[j] || !(squared_distances[k] > 0)) continue;
+        if (!known[j] || !(squared_distances[k] > 1e-30 * radius * radius)) continue;
         neighbors[i].push_back({j, static_cast<float>(1 / squared_distances[k])});
         const PairBins bins =
             BinsOf(normal, Row(normals, j), Row(points, j) - p, std::sqrt(squared_distances[k]));

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "depth_rows.h"
 #include "parallel.h"
 #include "vectors.h"
 
@@ -61,8 +62,8 @@ void IntegrateDepth(const DepthImageView& image, const Eigen::Matrix4d& X_WB, do
   Require(options.min_depth > 0 && options.min_depth < options.max_depth,
           "min_depth: must lie above 0 and below max_depth");
   Require(!image.rays, "image: must be that of a pinhole; rectify it first");
-  Require(image.fx > 0 && image.fy > 0, "fx, fy: must be positive");
-  Require(X_WB.allFinite() && image.X_WC.allFinite(), "poses: must be finite");
+  internal::CheckDepthImageView(image);
+  Require(X_WB.allFinite(), "X_WB: must be finite");
 
   // Rigid: the inverse is the transpose.
   const Eigen::Matrix3d R_CW = image.X_WC.topLeftCorner<3, 3>().transpose();
