@@ -203,7 +203,6 @@ for size in sizes:
         seconds[name].append(time.process_time() - begin)
         assert result.X_WO is not None
         assert error_of(result, bottle) < 0.0015
-assert seconds["coherent point drift"][-1] > 1.3 * seconds["filter, to planes"][-1]
 
 fig, axes = plt.subplots(1, 2, figsize=(10, 3.4))
 axes[0].plot(outlier_weights, errors, "o-")
