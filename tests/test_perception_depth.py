@@ -187,11 +187,28 @@ def test_noise_that_is_stated_is_averaged_over_a_larger_window() -> None:
     assert np.nanmedian(angles(stated, normal)) < 4
 
 
+def test_normals_of_a_plane_of_which_pixels_lack() -> None:
+    # A window needs some of its pixels, not all; what is there says exactly what the plane is.
+    rng = np.random.default_rng(0)
+    normal = np.array([0.4, -0.2, -np.sqrt(0.8)])
+    depth = plane_depth(normal, -1.0).astype(np.float32)
+    for lacking, window, least in ((0.2, 5, 0.95), (0.2, 9, 0.999), (0.8, 5, 0.0)):
+        holed = np.where(rng.uniform(size=depth.shape) < lacking, np.nan, depth)
+        n = normals_from_depth(holed.astype(np.float32), CAMERA, DepthConfig(window=window))
+        known = np.isfinite(n[..., 0])
+        assert not known[np.isnan(holed)].any()
+        assert known[np.isfinite(holed)].mean() >= least
+        if lacking > 0.5:  # Too little is left for any window.
+            assert known.sum() < 0.01 * known.size
+        assert angles(n[known], normal).max(initial=0.0) < 0.05
+
+
 def test_levels_and_threads_agree_bit_for_bit() -> None:
     depth = np.minimum(
         plane_depth(np.array([0.2, 0.3, -0.93]), -0.8),
         sphere_depth(np.array([0.02, -0.01, 0.6]), 0.08),
     )
+    depth[np.random.default_rng(0).uniform(size=depth.shape) < 0.03] = np.nan
     for config in (DepthConfig(), DepthConfig(window=7, noise_constant=0.001)):
         view = native_view(depth, CAMERA, config, np.eye(4))
         for call in (_core.depth_normals, _core.unproject_depth):

@@ -19,6 +19,8 @@ using Int = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
 constexpr float kInfinity = __builtin_inff();
 constexpr float kNaN = __builtin_nanf("");
+/// The part of a window's pixels that must be measured.
+constexpr float kLeastMeasured = 0.6f;
 
 inline Float Load(const float* from) {
   Float v;
@@ -81,6 +83,54 @@ bool Place(float* w, const RayRow& rays, const Placement& at, int begin, int end
   return Any(found);
 }
 
+/// The planes of windows that lack pixels, and the variance of what is left; that is NaN where too
+/// many lack.
+struct PartFit {
+  Float mean, a, b, variance;
+};
+
+PartFit FitPart(const float* const* w, int r, int u, const Float& centre) {
+  Float count{}, of_u{}, of_v{}, of_uu{}, of_uv{}, of_vv{};
+  Float sum{}, square{}, by_u{}, by_v{};
+  for (int dv = -r; dv <= r; ++dv) {
+    const float* const row = w[dv + r] + u;
+    const float v = static_cast<float>(dv);
+    Float row_count{}, row_of_u{}, row_sum{};
+    for (int du = -r; du <= r; ++du) {
+      const float step = static_cast<float>(du);
+      const Float off = Load(row + du) - centre;
+      const Int measured = off == off;
+      const Float d = measured ? off : Fill(0.0f);
+      const Float one = measured ? Fill(1.0f) : Fill(0.0f);
+      row_count += one;
+      row_of_u += step * one;
+      of_uu += (step * step) * one;
+      row_sum += d;
+      square += d * d;
+      by_u += step * d;
+    }
+    count += row_count;
+    of_u += row_of_u;
+    of_v += v * row_count;
+    of_uv += v * row_of_u;
+    of_vv += (v * v) * row_count;
+    sum += row_sum;
+    by_v += v * row_sum;
+  }
+  // About the mean of the measured pixels.
+  const Float per_count = 1.0f / count;
+  const Float u_mean = of_u * per_count, v_mean = of_v * per_count, offset = sum * per_count;
+  const Float uu = of_uu - of_u * u_mean, uv = of_uv - of_u * v_mean, vv = of_vv - of_v * v_mean;
+  const Float to_u = by_u - sum * u_mean, to_v = by_v - sum * v_mean;
+  const Float per_determinant = 1.0f / (uu * vv - uv * uv);
+  const Float a = (vv * to_u - uv * to_v) * per_determinant;
+  const Float b = (uu * to_v - uv * to_u) * per_determinant;
+  const Float variance = (square * per_count - offset * offset) - (a * to_u + b * to_v) * per_count;
+  const float side = static_cast<float>(2 * r + 1);
+  const Int enough = count >= kLeastMeasured * (side * side);
+  return {((centre + offset) - a * u_mean) - b * v_mean, a, b, enough ? variance : Fill(kNaN)};
+}
+
 template <int kRadius>
 void FitOf(const float* const* w, int any_radius, int begin, int end, const FitRow& fits) {
   const int r = kRadius ? kRadius : any_radius;
@@ -104,10 +154,19 @@ void FitOf(const float* const* w, int any_radius, int begin, int end, const FitR
       sum += row_sum;
       by_v += static_cast<float>(dv) * row_sum;
     }
-    const Float a = by_u * per_moment, b = by_v * per_moment, offset = sum * per_count;
+    Float a = by_u * per_moment, b = by_v * per_moment;
+    const Float offset = sum * per_count;
+    Float mean = centre + offset;
     Float variance = (square * per_count - offset * offset) - (a * by_u + b * by_v) * per_count;
+    const Int part = (sum != sum) & (centre == centre);
+    if (Any(part)) {
+      const PartFit fit = FitPart(w, r, u, centre);
+      mean = part ? fit.mean : mean;
+      a = part ? fit.a : a;
+      b = part ? fit.b : b;
+      variance = part ? fit.variance : variance;
+    }
     variance = variance < 0.0f ? Fill(0.0f) : variance;
-    const Float mean = centre + offset;
     // An error dw of the inverse depth is an error dw / w² of the depth.
     const Float squared = mean * mean;
     const Float residual = variance / (squared * squared);
@@ -138,8 +197,8 @@ void Surface(const float* w, const FitRow* fits, int radius, const RayRow& rays,
     const Float best_possible = 1.3f * noise + limits.settled_variance;
     Float fitted = Load(fits[1].mean + u), a = Load(fits[1].a + u), b = Load(fits[1].b + u);
     Float residual = Load(fits[1].residual + u);
-    // A window beside the pixel's own must be several times better.
-    Float best = residual <= best_possible ? Fill(0.0f) : 0.16f * residual;
+    // A window beside the pixel's own must be ten times better.
+    Float best = residual <= best_possible ? Fill(0.0f) : 0.1f * residual;
     if (Any(best > 0.0f)) {
       for (int row = 0; row < 3; ++row) {
         for (int column = -radius; column <= radius; column += radius) {
@@ -170,7 +229,7 @@ void Surface(const float* w, const FitRow* fits, int radius, const RayRow& rays,
     const Float off = own - fitted;
     const Float squared = fitted * fitted;
     const Int fits_here =
-        (residual <= limits.max_variance + 2.0f * noise) &
+        (residual <= limits.max_variance + 1.3f * noise) &
         (off * off <= (limits.max_variance + 9.0f * noise) * (squared * squared)) &
         (fitted >= limits.min_cosine * (length * ray));
     const Float scale = fits_here ? -1.0f / length : Fill(kNaN);

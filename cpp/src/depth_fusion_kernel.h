@@ -25,7 +25,7 @@ struct RayRow {
 
 /// The planes in inverse depth, w(u + du, v + dv) = mean + a du + b dv, of the windows centred on a
 /// row of pixels, and the mean squared distance of the windows' pixels to them along the optical
-/// axis [m²], infinite where the window has a pixel without measurement.
+/// axis [m²], infinite where the window's centre or too many of its pixels are no measurement.
 struct FitRow {
   float* mean;
   float* a;
