@@ -33,8 +33,8 @@ class DepthConfig:
     max_incidence: float = float(np.deg2rad(83.0))
     # The standard deviation of the depth z is noise_constant + noise_quadratic z^2 [m], [1/m];
     # 0 or more. A larger window then averages more of it, and rounds off more: in a bin 0.9 m away
-    # 7 pixels suit a noise of 0.001 and 0.002 that differs from pixel to pixel, and 9 to 11 that
-    # of a D415 (DepthNoiseConfig), 0 and 0.0026, which neighbours share.
+    # 7 pixels suit a noise of 0.001 and 0.002 that differs from pixel to pixel, and 11 that of a
+    # D415 (DepthNoiseConfig), 0 and 0.0026, which neighbours share.
     noise_constant: float = 0.0
     noise_quadratic: float = 0.0
 
@@ -94,7 +94,8 @@ def normals_from_depth(
     nine windows that contain it (centred on it, or with it on the rim): its own, unless another
     fits several times better, as happens near an edge of depth or a crease, but not on a surface
     that is merely curved. Thus no normal mixes the two sides of an edge; a pixel that no window
-    fits (a speck, a sliver, a flying pixel) gets none. Choosing the smoothest of the windows
+    fits (a speck, a sliver, a flying pixel) gets none. A window may lack two fifths of its pixels,
+    but not the middle one. Choosing the smoothest of the windows
     around a pixel is Kuwahara's filter (1976); planes in inverse depth are those of Fan et al.,
     "Three-Filters-to-Normal" (2021).
 
