@@ -50,7 +50,7 @@ def test_wrong_candidate_is_found_out_and_replaced():
 
 def test_bad_input_is_named():
     good = np.eye(3)
-    with pytest.raises(ValueError, match="points"):
+    with pytest.raises(ValueError, match="scene_vectors"):
         certify_rotation(good, good[:2], 0.1)
     with pytest.raises(ValueError, match="bound"):
         certify_rotation(good, good, 0)

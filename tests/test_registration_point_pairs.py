@@ -115,7 +115,7 @@ def test_bad_input_is_named() -> None:
     cloud = _steps(np.random.default_rng(5), 100)
     with pytest.raises(InputError, match="normals"):
         PointPairModel(PointCloud(cloud.points))
-    with pytest.raises(ValueError, match="points: expected 2"):
+    with pytest.raises(ValueError, match="cloud: needs at least two"):
         PointPairModel(cloud.select(np.array([0])), 0.01)
     with pytest.raises(ValueError, match="distance_step"):
         PointPairModel(cloud, 0.0)

@@ -123,11 +123,12 @@ class ArrayArgument {
                                 Text(got, ndim()));
   }
 
-  /// @throws std::invalid_argument if a number is NaN or infinite.
+  /// @throws std::invalid_argument if a number is NaN, infinite, or so large that sums of a few
+  ///     squares would not be finite.
   void RequireFinite() const {
-    double sum = 0;  // 0 · x is NaN exactly where x is not finite.
-    for (const double* x = data(); x != end(); ++x) sum += 0.0 * *x;
-    if (sum != 0) throw std::invalid_argument(Name() + ": must be finite");
+    bool good = true;  // Looked at to the end: several at a time.
+    for (const double* x = data(); x != end(); ++x) good &= std::abs(*x) <= 1e153;
+    if (!good) throw std::invalid_argument(Name() + ": must be finite, and at most 1e153");
   }
 
   /// All of them as whole numbers.
@@ -167,6 +168,17 @@ class VectorArgument : public ArrayArgument {
   VectorArgument(nanobind::handle value, const char* name, std::ptrdiff_t n)
       : ArrayArgument(value, name) {
     RequireShape({n});
+    RequireFinite();
+  }
+};
+
+/// Rows of x, y, z, finite.
+class RowsArgument : public ArrayArgument {
+ public:
+  /// @param n how many there must be; -1 for any number.
+  RowsArgument(nanobind::handle value, const char* name, std::ptrdiff_t n = -1)
+      : ArrayArgument(value, name) {
+    RequireShape({n, 3});
     RequireFinite();
   }
 };

@@ -135,8 +135,9 @@ class Search {
   }
 
   BranchAndBoundPose Run() {
-    const auto start = std::chrono::steady_clock::now();
     Guess();
+    // Finer than sums of such numbers can tell, there would be no end.
+    options_.max_gap = std::max(options_.max_gap, 1e-12 * best_cost_);
     std::priority_queue<Cube> queue;
     queue.push({Eigen::Vector3d::Zero(), kPi, 0, best_cost_});
     const int dimensions = options_.planar ? 1 : 3;
@@ -146,9 +147,7 @@ class Search {
       lower_bound = std::min(best_cost_, excluded_);
       if (!queue.empty()) lower_bound = std::min(lower_bound, queue.top().bound);
       result.closed = best_cost_ - lower_bound <= options_.max_gap;
-      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-      if (result.closed || queue.empty() || result.nodes >= options_.max_nodes ||
-          elapsed.count() > options_.time_limit) {
+      if (result.closed || queue.empty() || result.nodes >= options_.max_nodes || OutOfTime()) {
         break;
       }
       const Cube parent = queue.top();
@@ -169,6 +168,11 @@ class Search {
   }
 
  private:
+  bool OutOfTime() const {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    return elapsed.count() > options_.time_limit;
+  }
+
   static Cube Child(const Cube& parent, int child, int dimensions) {
     Cube cube{parent.center, parent.half / 2, parent.bound, parent.cost};
     for (int axis = 0; axis < dimensions; ++axis) {
@@ -237,6 +241,7 @@ class Search {
       std::pop_heap(heap_.begin(), heap_.end());
       const Cube parent = heap_.back();
       heap_.pop_back();
+      if (++visited_ % 64 == 0 && OutOfTime()) return std::min(parent.bound, best);
       if (best - parent.bound <= kInnerGap * std::max(options_.max_gap, best_cost_ - best))
         return std::min(parent.bound, best);
       for (int child = 0; child < 1 << dimensions; ++child) {
@@ -341,6 +346,8 @@ class Search {
   Pose best_;
   double best_cost_ = kInfinity;
   double excluded_ = kInfinity;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::size_t visited_ = 0;  // Boxes of translations.
 };
 
 }  // namespace

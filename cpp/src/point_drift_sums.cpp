@@ -16,7 +16,9 @@ using internal::DriftBlock;
 using internal::kDriftLanes;
 using internal::Require;
 
-constexpr float kFarAway = 1e15f;
+constexpr float kFarAway = 1e15f;  // Where lanes without a point are.
+constexpr double kFarthestPoint = 1e13;
+constexpr double kFarthestQuery = 1e14;
 /// Gaussians are cut where they have fallen to exp of minus this.
 constexpr double kCut = 40;
 /// Part of a sum that may be cut off.
@@ -29,6 +31,11 @@ const internal::DriftKernel& Kernel() {
   if (level == SimdLevel::kAvx2) return internal::avx2::kDrift;
 #endif
   return internal::baseline::kDrift;
+}
+
+/// In single precision, within the limit. Limits that differ keep apart what is beyond both.
+float Scaled(double value, double limit) {
+  return static_cast<float>(std::clamp(value, -limit, limit));
 }
 
 /// Divides points at the middle of the longest side, down to runs of sixteen.
@@ -72,9 +79,22 @@ GaussianSums::GaussianSums(const double* points, std::size_t n)
   Require(n > 0, "points: there is no point");
   const std::vector<std::int32_t> order = SpatialOrder(points, n);
   const Eigen::Map<const Eigen::Matrix<double, 3, -1>> p(points, 3, static_cast<Eigen::Index>(n));
-  center_ = p.rowwise().mean();
-  const double spread = (p.colwise() - center_).squaredNorm() / static_cast<double>(n);
-  unit_ = spread > 0 ? std::sqrt(spread) : 1.0;
+  // Medians: single points far off must not cost the others their precision.
+  std::vector<double> values(n);
+  const auto median = [&values] {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < n; ++i) values[i] = p(axis, static_cast<Eigen::Index>(i));
+    center_[axis] = median();
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    values[i] = (p.col(static_cast<Eigen::Index>(i)) - center_).norm();
+  }
+  const double spread = median();
+  unit_ = spread > 0 ? spread : 1.0;
 
   const std::size_t num_blocks = (n + kDriftLanes - 1) / kDriftLanes;
   blocks_.assign(num_blocks * 3 * kDriftLanes, kFarAway);
@@ -86,7 +106,7 @@ GaussianSums::GaussianSums(const double* points, std::size_t n)
       box.upper[axis] = -kFarAway;
       for (std::size_t k = 0; k < kDriftLanes && b * kDriftLanes + k < n; ++k) {
         const std::int32_t i = order[b * kDriftLanes + k];
-        const auto value = static_cast<float>((p(axis, i) - center_[axis]) / unit_);
+        const float value = Scaled((p(axis, i) - center_[axis]) / unit_, kFarthestPoint);
         blocks_[(3 * b + axis) * kDriftLanes + k] = value;
         box.lower[axis] = std::min(box.lower[axis], value);
         box.upper[axis] = std::max(box.upper[axis], value);
@@ -122,7 +142,8 @@ void GaussianSums::At(const double* queries, std::size_t n, double sigma, double
       Box box;
       for (int axis = 0; axis < 3; ++axis) {
         for (std::size_t i = begin; i < end; ++i) {
-          const auto value = static_cast<float>((queries[3 * i + axis] - center_[axis]) / unit_);
+          const float value =
+              Scaled((queries[3 * i + axis] - center_[axis]) / unit_, kFarthestQuery);
           local[i - begin][axis] = value;
           box.lower[axis] = i == begin ? value : std::min(box.lower[axis], value);
           box.upper[axis] = i == begin ? value : std::max(box.upper[axis], value);

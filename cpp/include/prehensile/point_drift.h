@@ -42,7 +42,7 @@ class GaussianSums {
 
   std::size_t size_;
   Eigen::Vector3d center_;
-  double unit_;                // The points' root mean square distance from their centroid [m].
+  double unit_;                // The points' median distance from their medians [m].
   std::vector<float> blocks_;  // Blocks of sixteen points.
   std::vector<Box> boxes_;
 };

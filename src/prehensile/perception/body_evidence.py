@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from prehensile.native import _core
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.free_space import DepthView
 from prehensile.perception.mesh import TriangleMesh
+from prehensile.perception.ranges import require_ranges
 from prehensile.perception.registration.constraints import corner_points
 from prehensile.perception.registration.losses import RobustLoss
 
@@ -51,7 +53,7 @@ class Body:
             if value is None:
                 continue
             array = np.ascontiguousarray(value, dtype=float)
-            if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
+            if array.ndim != 2 or array.shape[1] != 3 or not within(array, FARTHEST):
                 raise ValueError(f"{name}: expected (N, 3) finite numbers, not {array.shape}")
             object.__setattr__(self, name, array)
         if self.points.shape != self.normals.shape or not len(self.points):
@@ -123,7 +125,8 @@ class EvidenceConfig:
         loss_scale: scale of the Geman-McClure loss once the fit settles [m], > 0; it starts at
             max_distance.
         max_pixels: pixels looked at per image, >= 1.
-        margin: how far in front of the measured depth a surface may be [m], >= 0.
+        margin: how far in front of the measured depth a surface may be [m], >= 0; and how far
+            beside what was measured it counts as seen there, though it is drawn back.
         max_violation: deeper violations of the free space count as this deep [m], > 0.
         search_radius: how far to look for the edge of the free space [pixels], 0 to 100.
         free_space_weight: of a sample's violation against a point's distance, >= 0.
@@ -147,16 +150,27 @@ class EvidenceConfig:
     max_normal_angle: float = float(np.deg2rad(60))
 
     def __post_init__(self) -> None:
-        """Checks the ranges that the kernels do not check.
+        """Checks the ranges.
 
         Raises:
             ValueError: naming the field.
         """
-        for name in ("noise", "max_distance", "farthest", "loss_scale", "max_violation"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name}: must be positive, not {getattr(self, name)}")
-        if not 1 <= self.correlation < np.inf:
-            raise ValueError(f"correlation: must be at least 1, not {self.correlation}")
+        length = (1e-9, 1e6)
+        require_ranges(
+            self,
+            noise=length,
+            correlation=(1, 1e9),
+            max_distance=length,
+            farthest=length,
+            loss_scale=length,
+            max_pixels=(1, 1e9),
+            margin=(0, 1e6),
+            max_violation=length,
+            search_radius=(0, 100),
+            free_space_weight=(0, 1e9),
+            occluder_margin=(0, 1e6),
+            max_normal_angle=(0, np.pi),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +184,8 @@ class Evidence:
             gradient; on the scale of the loss that was asked for.
         residual: root mean square distance of the points that count [m]; NaN without any.
         num_points: effective number of points that count (the sum of their weights).
-        seen: part of the samples facing a camera that were measured where they should be.
+        seen: part of the samples facing a camera that were measured where they should be, up to
+            the margin.
         in_free: part of them that lies where the camera saw through.
         occluded: part of them that lies behind something.
     """

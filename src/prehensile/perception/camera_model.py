@@ -75,7 +75,7 @@ class CameraModel:
         faults = []
         for name in ("width", "height"):
             value = getattr(self, name)
-            if value != int(value) or not 1 <= value <= 32768:
+            if not 1 <= value <= 32768 or value != int(value):
                 faults.append(f"{name} is {value}; expected a whole number from 1 to 32768")
         for name in ("fx", "fy"):
             value = getattr(self, name)

@@ -31,7 +31,7 @@ class PointCloud:
     Whatever array-like is given becomes an array of the type below.
 
     Attributes:
-        points: (N, 3) positions [m], finite.
+        points: (N, 3) positions [m], finite (and none beyond 1e30).
         normals: (N, 3) unit normals, pointing out of the surface; None if not known. Zero where a
             single one is not known.
         colors: (N, 3) uint8 red, green, blue; None if not known.
@@ -68,8 +68,11 @@ class PointCloud:
                 array = np.broadcast_to(array, expected)
             if array.shape != expected:
                 faults.append(f"{name} has shape {array.shape}; expected {expected}")
-            elif not np.isfinite(array).all():
-                faults.append(f"{name} holds values that are not finite")
+            elif not within(array, _LIMITS.get(name, FARTHEST)):
+                faults.append(
+                    f"{name} holds values that are not finite"
+                    + (", or vectors longer than one" if name == "normals" else " or beyond 1e30")
+                )
             object.__setattr__(self, name, array)
         if faults:
             raise InputError(*faults)
@@ -121,6 +124,11 @@ class PointCloud:
         )
 
 
+FARTHEST = 1e30
+"""Coordinates beyond this are not places [m]: products of a few of them would overflow."""
+
+_LIMITS = {"normals": 1.001}
+
 _FIELDS: tuple[tuple[str, Any, tuple[int, ...]], ...] = (
     ("points", np.float64, (3,)),
     ("normals", np.float64, (3,)),
@@ -128,6 +136,11 @@ _FIELDS: tuple[tuple[str, Any, tuple[int, ...]], ...] = (
     ("labels", np.int64, ()),
     ("sensor_origins", np.float64, (3,)),
 )
+
+
+def within(array: NDArray[Any], limit: float) -> bool:
+    """Whether all values lie within -limit and limit; NaN does not."""
+    return not array.size or bool(array.max() <= limit and array.min() >= -limit)
 
 
 def _converted(value: Any, dtype: Any) -> NDArray[Any]:
@@ -172,36 +185,42 @@ def rotate(vectors: NDArray[np.floating], R: NDArray[np.floating]) -> NDArray[np
     return out
 
 
-def inside_box(points: NDArray[np.floating], box: Box) -> NDArray[np.bool_]:
+def inside_box(points: ArrayLike, box: Box) -> NDArray[np.bool_]:
     """Which points (..., 3) in W lie inside or on the box: a mask (...).
 
     A point with a coordinate that is not finite is outside.
 
     Raises:
-        ValueError: if the shape is wrong, or the box's size is not three finite numbers.
+        ValueError: if the shape is wrong, the box's size is not three finite numbers of at least
+            0, or its pose is not finite.
     """
     rows = _rows(points)
-    mask = _core.inside_box(rows, box.X_WB.inverse().GetAsMatrix4(), box.size)
-    return mask.view(np.bool_).reshape(points.shape[:-1])
+    size = np.asarray(box.size, dtype=float)
+    if size.shape != (3,) or not (np.isfinite(size) & (size >= 0)).all():
+        raise ValueError(f"box: its size must be three finite numbers of at least 0, not {size}")
+    if not np.isfinite(box.X_WB.translation()).all():
+        raise ValueError("box: its pose must be finite")
+    mask = _core.inside_box(rows, box.X_WB.inverse().GetAsMatrix4(), size)
+    return mask.view(np.bool_).reshape(np.shape(points)[:-1])
 
 
-def inside_half_space(
-    points: NDArray[np.floating], normal: ArrayLike, offset: float
-) -> NDArray[np.bool_]:
+def inside_half_space(points: ArrayLike, normal: ArrayLike, offset: float) -> NDArray[np.bool_]:
     """Which points p (..., 3) have normal . p >= offset: a mask (...).
 
     A point with a coordinate that is not finite has not.
 
     Args:
         points: (..., 3) positions [m].
-        normal: (3,) normal of the plane, pointing into the half-space that is meant.
+        normal: (3,) normal of the plane, not zero, pointing into the half-space that is meant.
         offset: the plane's distance from the origin along the normal, times its length [m].
 
     Raises:
-        ValueError: if a shape is wrong or normal or offset is not finite.
+        ValueError: if a shape is wrong, normal or offset is not finite, or normal is zero.
     """
+    if not np.any(normal):
+        raise ValueError("normal: must not be zero")
     mask = _core.inside_half_space(_rows(points), normal, offset)
-    return mask.view(np.bool_).reshape(points.shape[:-1])
+    return mask.view(np.bool_).reshape(np.shape(points)[:-1])
 
 
 def crop(cloud: PointCloud, box: Box) -> PointCloud:
@@ -212,7 +231,7 @@ def crop(cloud: PointCloud, box: Box) -> PointCloud:
     return cloud.select(inside_box(cloud.points, box))
 
 
-def _rows(points: NDArray[np.floating]) -> NDArray[np.floating]:
+def _rows(points: ArrayLike) -> NDArray[np.floating]:
     """Points (..., 3) as contiguous rows of float32 or float64."""
     array = np.asarray(points)
     if array.ndim < 1 or array.shape[-1] != 3:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.perception.body_evidence import Body, BodyEvidence, EvidenceConfig
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.free_space import DepthView
 from prehensile.perception.registration.constraints import HalfSpaces, corner_points
 from prehensile.perception.registration.result import (
@@ -62,10 +63,16 @@ def refine_constrained(
     """
     config = config or EvidenceConfig()
     points = np.ascontiguousarray(scene_points, dtype=float)
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+    if points.ndim != 2 or points.shape[1] != 3 or not within(points, FARTHEST):
         raise ValueError(f"scene_points: expected (N, 3) finite numbers, not {points.shape}")
     if not len(points):
         raise ValueError("scene_points: there is no point")
+    if not within(X_WO_guess.translation(), FARTHEST):
+        raise ValueError("X_WO_guess: must be finite")
+    if not 0 <= min_inliers <= 1:
+        raise ValueError(f"min_inliers: must be from 0 to 1, not {min_inliers}")
+    if not max_violation >= 0:
+        raise ValueError(f"max_violation: must be at least 0, not {max_violation}")
     limits = half_spaces or HalfSpaces(np.zeros((0, 3)), np.zeros(0))
     normals, offsets = limits.unit(3)
     corners = corner_points(body.corners, body.points)

@@ -39,7 +39,13 @@ class DepthConfig:
     noise_quadratic: float = 0.0
 
     def limits(self) -> tuple[float, float, int, float, float, float, float]:
-        """The settings in the order of the native calls."""
+        """The settings in the order of the native calls.
+
+        Raises:
+            InputError: if the window is out of range; the native calls check the rest.
+        """
+        if not 3 <= self.window <= 17:
+            raise InputError(f"window: must be odd, from 3 to 17, not {self.window}")
         return (
             self.min_depth,
             self.max_depth,
@@ -147,8 +153,8 @@ def native_view(
             image = np.ascontiguousarray(image, dtype=np.float32)
     elif np.issubdtype(image.dtype, np.integer):
         scale = config.depth_unit
-        if not scale > 0:
-            raise InputError(f"depth_unit is {scale}; it must be positive")
+        if not 0 < scale < np.inf:
+            raise InputError(f"depth_unit is {scale}; it must be positive and finite")
         dtype = np.uint16 if image.dtype == np.uint16 else np.float32
         image = np.ascontiguousarray(image, dtype=dtype)
     else:

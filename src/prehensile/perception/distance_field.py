@@ -145,7 +145,10 @@ class DistanceField:
         Raises:
             ValueError: naming the argument.
         """
-        x, y, z = np.asarray(origin, dtype=float)
+        corner = np.asarray(origin, dtype=float)
+        if corner.shape != (3,):
+            raise ValueError(f"origin: expected shape (3,), not {corner.shape}")
+        x, y, z = corner
         d, g = np.asarray(distances, dtype=np.float32), np.asarray(gradients, dtype=np.float32)
         if d.ndim != 3 or g.shape != (*d.shape, 3):
             raise ValueError(
@@ -186,7 +189,7 @@ class DistanceField:
             num_threads: to share the work.
 
         Raises:
-            ValueError: naming ``points`` if they are no such array.
+            ValueError: naming ``points`` if p_OQ is no such array.
         """
         return FieldSample(*self.core.at(p_OQ, num_threads))
 
@@ -194,7 +197,7 @@ class DistanceField:
         """Nearest points of the surface to points Q, (N, 3) in O, finite.
 
         Raises:
-            ValueError: naming ``points`` if they are no such array.
+            ValueError: naming ``points`` if p_OQ is no such array.
         """
         return SurfacePoints(*self.core.closest(p_OQ))
 

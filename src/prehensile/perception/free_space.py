@@ -33,9 +33,14 @@ class DepthView:
         """What the kernels take.
 
         Raises:
-            ValueError: if a shape is wrong or the camera has distortion.
+            ValueError: if a shape is wrong, the depth is not one of floats, or the camera has
+                distortion.
         """
         model, X_WC = self.camera
+        if not np.issubdtype(np.asarray(self.depth).dtype, np.floating):
+            # Whole numbers are some camera's units, most likely millimetres.
+            held = np.asarray(self.depth).dtype
+            raise ValueError(f"depth: expected floats in metres, not {held}")
         depth = np.ascontiguousarray(self.depth, dtype=np.float32)
         if depth.shape != (model.height, model.width):
             raise ValueError(f"depth: expected {(model.height, model.width)}, not {depth.shape}")

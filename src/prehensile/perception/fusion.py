@@ -104,6 +104,7 @@ def downsample(cloud: PointCloud, voxel_size: float, *, num_threads: int = 1) ->
     Raises:
         InputError: if voxel_size is not positive, or too small for the cloud's extent.
     """
+    voxel_size = float(voxel_size)  # Both grids below must round alike.
     try:
         voxels = voxel_downsample(
             cloud.points, voxel_size, normals=cloud.normals, num_threads=num_threads

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 
 from prehensile.errors import InputError
 from prehensile.native.surface import MeshSurface
-from prehensile.perception.cloud import rotate
+from prehensile.perception.cloud import FARTHEST, rotate, within
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +17,7 @@ class TriangleMesh:
     """A surface of triangles, in the frame O of the object that it is.
 
     Attributes:
-        vertices: (V, 3) positions [m], finite.
+        vertices: (V, 3) positions [m], finite (and none beyond 1e30).
         triangles: (T, 3) int64 indices of the vertices, counter-clockwise seen from outside;
             at least one.
     """
@@ -37,8 +37,8 @@ class TriangleMesh:
         faults = []
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             faults.append(f"vertices has shape {vertices.shape}; expected (V, 3)")
-        elif not np.isfinite(vertices).all():
-            faults.append("vertices holds values that are not finite")
+        elif not within(vertices, FARTHEST):
+            faults.append("vertices holds values that are not finite or beyond 1e30")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
             faults.append(f"triangles has shape {triangles.shape}; expected (T, 3) with T >= 1")
         elif not np.issubdtype(triangles.dtype, np.integer):
@@ -96,6 +96,8 @@ def merge_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     Raises:
         InputError: there are none.
     """
+    if not meshes:
+        raise InputError("meshes is empty; expected at least one")
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return TriangleMesh(
         np.concatenate([np.zeros((0, 3)), *(mesh.vertices for mesh in meshes)]),

@@ -40,7 +40,7 @@ def statistical_outliers(
     k = min(neighbors, len(cloud))
     _, distances = KdTree(cloud.points).nearest(cloud.points, k, num_threads=num_threads)
     means = distances.mean(axis=1)
-    apart = means > 0
+    apart = (means > 0) & np.isfinite(means)
     if apart.sum() < 2:
         return apart
     limit = means[apart].mean() + std_ratio * means[apart].std(ddof=1)

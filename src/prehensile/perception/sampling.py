@@ -73,7 +73,7 @@ def sample_mesh_poisson_disc(
     assert radius is not None
     if not 0 < radius < np.inf:
         raise ValueError(f"radius: must be positive and finite, not {radius}")
-    throws = 25 * mesh.area() / radius**2 + 25
+    throws = 25 * (mesh.area() / radius / radius) + 25
     if not throws <= _MOST_SAMPLES:
         raise ValueError(f"radius: {radius} is too small for a surface of {mesh.area():.3g} m²")
     samples = sample_mesh_uniform(mesh, int(throws), seed=seed)

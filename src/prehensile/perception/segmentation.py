@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from prehensile.native import _core
 from prehensile.perception.cloud import Box, PointCloud, inside_box
+
+_MOST_SEGMENTS = 4096  # Their matrix takes 128 MiB.
 
 
 def convex_segments(
@@ -37,15 +39,22 @@ def convex_segments(
 
     Returns:
         (N,) labels 0, 1, ... by decreasing number of points; -1 for points of no piece.
+
+    Raises:
+        InputError: if the cloud has no normals.
+        ValueError: naming the argument.
     """
+    if not 0 <= max_concavity <= np.pi:
+        raise ValueError(f"max_concavity: must be from 0 to pi, not {max_concavity}")
+    if not max_step >= 0:
+        raise ValueError(f"max_step: must be at least 0, not {max_step}")
+    normals = cloud.require_normals()
     return _core.convex_segments(
-        cloud.points, cloud.require_normals(), voxel_size, max_concavity, max_step, min_points
+        cloud.points, normals, voxel_size, max_concavity, max_step, max(min_points, 0)
     )
 
 
-def resting_pairs(
-    cloud: PointCloud, labels: NDArray[np.int64], voxel_size: float
-) -> NDArray[np.int64]:
+def resting_pairs(cloud: PointCloud, labels: ArrayLike, voxel_size: float) -> NDArray[np.int64]:
     """How much of each segment is seen to lie under each other one.
 
     Where something stands or leans on a surface, a patch that faces upward meets one that does
@@ -58,8 +67,15 @@ def resting_pairs(
 
     Returns:
         (L, L) matrix; entry [a, b] counts the adjacent points that show b resting on a.
+
+    Raises:
+        InputError: if the cloud has no normals.
+        ValueError: naming the argument.
     """
+    labels = _labels(labels, cloud)
     count = int(labels.max(initial=-1)) + 1
+    if count > _MOST_SEGMENTS:
+        raise ValueError(f"labels: {count} segments are more than {_MOST_SEGMENTS}")
     return _core.resting_pairs(cloud.points, cloud.require_normals(), labels, voxel_size, count)
 
 
@@ -107,15 +123,30 @@ def subtract(cloud: PointCloud, solids: Sequence[Box], *, margin: float) -> Poin
     return cloud.select(kept)
 
 
-def nearest_segment(
-    cloud: PointCloud, labels: NDArray[np.int64], p_W: NDArray[np.float64]
-) -> PointCloud:
+def nearest_segment(cloud: PointCloud, labels: ArrayLike, p_W: ArrayLike) -> PointCloud:
     """The object of interest: the segment with the point nearest to p_W (3,), as a cloud.
 
     Points labelled -1 are passed over; without any segment the result is empty.
+
+    Raises:
+        ValueError: naming the argument.
     """
+    labels = _labels(labels, cloud)
+    goal = np.asarray(p_W, dtype=np.float64)
+    if goal.shape != (3,) or not np.isfinite(goal).all():
+        raise ValueError(f"p_W: expected three finite numbers, not {p_W}")
     own = np.nonzero(labels >= 0)[0]
     if not len(own):
         return cloud.select(own)
-    distance = np.linalg.norm(cloud.points[own] - np.asarray(p_W, dtype=np.float64), axis=1)
+    distance = np.linalg.norm(cloud.points[own] - goal, axis=1)
     return cloud.select(labels == labels[own[np.argmin(distance)]])
+
+
+def _labels(labels: ArrayLike, cloud: PointCloud) -> NDArray[np.int64]:
+    """Labels as whole numbers, one for each point."""
+    array = np.asarray(labels)
+    if array.shape != (len(cloud),):
+        raise ValueError(f"labels: expected shape ({len(cloud)},), not {array.shape}")
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"labels: expected whole numbers, not {array.dtype}")
+    return array.astype(np.int64)

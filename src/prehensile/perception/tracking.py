@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.perception.body_evidence import Body, BodyEvidence, Evidence, EvidenceConfig
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.free_space import DepthView
+from prehensile.perception.ranges import require_ranges
 from prehensile.perception.turns import rotation_of, rotation_vector
 
 Array = NDArray[np.float64]
@@ -62,6 +64,27 @@ class TrackerConfig:
     max_coasting: float = 0.5
     velocity_decay: float = 0.2
 
+    def __post_init__(self) -> None:
+        """Checks the ranges.
+
+        Raises:
+            ValueError: naming the field.
+        """
+        require_ranges(
+            self,
+            angular_acceleration=(1e-9, 1e9),
+            acceleration=(1e-9, 1e9),
+            max_iterations=(1, 1e6),
+            min_seen=(0, 1),
+            max_in_free=(0, 1),
+            max_coasting=(0, np.inf),
+            velocity_decay=(1e-9, np.inf),
+        )
+        for name in ("initial_pose", "initial_velocity"):
+            pair = np.asarray(getattr(self, name), dtype=float)
+            if pair.shape != (2,) or not ((pair >= 1e-9) & (pair <= 1e9)).all():
+                raise ValueError(f"{name}: expected two positive numbers, not {pair}")
+
 
 @dataclass(frozen=True, eq=False)
 class ObjectState:
@@ -97,7 +120,14 @@ def start_tracking(
         X_WO: where a registration found it.
         time: when [s].
         config: its initial standard deviations.
+
+    Raises:
+        ValueError: if X_WO or time is not finite.
     """
+    if not within(X_WO.translation(), FARTHEST):
+        raise ValueError("X_WO: must be finite")
+    if not np.isfinite(time):
+        raise ValueError(f"time: must be finite, not {time}")
     deviations = [s for s in (*config.initial_pose, *config.initial_velocity) for _ in range(3)]
     return ObjectState(
         time, X_WO, np.zeros(6), np.diag(np.square(deviations)), TrackingStatus.TRACKING
@@ -141,13 +171,22 @@ def track_object(
     prediction holds what neither determines: an axis of symmetry, a part that is hidden. What is
     in front of the object is no evidence against it.
 
+    A table or bin that the object touches need not be known: points whose surface is turned away
+    from the object's are not taken for its own (``max_normal_angle`` of the evidence). A surface
+    close by that faces as the object's does, as the next one's in a row of boxes, is told apart by
+    its field among the occluders. An object that is LOST is retried only around where it was; a
+    search through the scene starts it anew: ``start_tracking(locate(cloud, known).X_WO, time)``, as
+    :class:`~prehensile.perception.systems.ObjectTracker` does.
+
     Args:
         body: the object's shape.
         state: after the images before, or :func:`start_tracking`.
         time: when the images were taken [s], not before the state's.
         views: one or several.
         occluders: distance fields and poses X_WK of bodies that may be in front of the object or
-            touch it, such as the links of a hand; their points are not taken for the object's.
+            touch it, such as the links of a hand or a table; their points are not taken for the
+            object's. Large flat bodies do with a coarse field, ``DistanceField.from_mesh(mesh,
+            spacing=0.02, margin=0.04)``.
             Pixels known otherwise not to be the object's: ``DepthView.ignored``.
         config: how to track.
 

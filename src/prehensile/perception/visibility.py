@@ -4,6 +4,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from prehensile.perception.cloud import FARTHEST, within
+
+_LARGEST_FACTOR = 1e6  # Beyond it rounding decides what is on the hull.
+
 
 def visible_points(
     points: NDArray[np.float64], p_WS: ArrayLike, *, radius_factor: float = 100.0
@@ -18,11 +22,12 @@ def visible_points(
     Args:
         points: (N, 3) positions [m], finite.
         p_WS: (3,) position of the sensor [m].
-        radius_factor: the sphere's radius as a multiple of the largest distance, > 1.
+        radius_factor: the sphere's radius as a multiple of the largest distance, above 1, at most
+            1e6.
 
     Raises:
         ValueError: if a shape is wrong, a value is not finite, a point is where the sensor is, or
-            radius_factor is not above 1.
+            radius_factor is out of range.
     """
     p = np.asarray(points, dtype=np.float64)
     origin = np.asarray(p_WS, dtype=np.float64)
@@ -30,13 +35,15 @@ def visible_points(
         raise ValueError(f"points: expected finite numbers of shape (N, 3), not {p.shape}")
     if origin.shape != (3,) or not np.isfinite(origin).all():
         raise ValueError("p_WS: expected three finite numbers")
-    if not 1 < radius_factor < np.inf:
-        raise ValueError(f"radius_factor: must be above 1 and finite, not {radius_factor}")
+    if not 1 < radius_factor <= _LARGEST_FACTOR:
+        raise ValueError(f"radius_factor: must be above 1, at most 1e6, not {radius_factor}")
     if len(p) < 4:  # No point of so few can hide another, but by standing right before it.
         return np.ones(len(p), dtype=bool)
+    if not within(p, FARTHEST) or not within(origin, FARTHEST):
+        raise ValueError(f"points, p_WS: must not lie beyond {FARTHEST:g}")
     ray = p - origin
     distance = np.linalg.norm(ray, axis=1)
-    if distance.min() == 0:
+    if not distance.min() > 0:
         raise ValueError("points: one of them is where the sensor is")
     radius = radius_factor * distance.max()
     flipped = ray * ((2 * radius - distance) / distance)[:, None]

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.native import _core
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 
 
@@ -59,7 +60,10 @@ def branch_and_bound(
 
     Returns:
         ``SUCCESS`` if the gap was reached, else ``NOT_CONVERGED``, with the best pose so far and
-        the bound that holds for it. Inliers are the scene points within max_distance.
+        the bound that holds for it. Inliers are the scene points within max_distance. The best
+        pose may still mean nothing: ``DEGENERATE`` where inliers or model lie on a line (in the
+        plane: at one place), ``LOW_OVERLAP`` where there are no inliers. That the best pose is
+        a good one only ``residual`` tells: unlike clouds have a best pose, too.
 
     Raises:
         ValueError: if shapes disagree, there are no points, or a number is not finite or out of
@@ -69,8 +73,8 @@ def branch_and_bound(
     for name, points in (("scene_points", scene), ("model_points", model)):
         if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
             raise ValueError(f"{name}: expected shape (N, 3) or (N, 2), N >= 1, not {points.shape}")
-        if not np.isfinite(points).all():
-            raise ValueError(f"{name}: must be finite")
+        if not within(points, FARTHEST):
+            raise ValueError(f"{name}: must be finite, and none beyond {FARTHEST:g}")
     if scene.shape[1] != model.shape[1]:
         raise ValueError(f"scene_points: in {scene.shape[1]} dimensions, the model is not")
     planar = scene.shape[1] == 2
@@ -78,19 +82,27 @@ def branch_and_bound(
         scene, model = (np.pad(points, ((0, 0), (0, 1))) for points in (scene, model))
     if gap_distance is None:
         gap_distance = 0.01 * float(np.linalg.norm(model - model.mean(axis=0), axis=1).max())
-    if not gap_distance >= 0:
-        raise ValueError(f"gap_distance: must not be negative, not {gap_distance}")
+    if not 0 <= gap_distance <= FARTHEST:
+        raise ValueError(f"gap_distance: must be from 0 to {FARTHEST:g}, not {gap_distance}")
     X_OW, cost, lower_bound, closed, nodes = _core.branch_and_bound(
         scene, model, max_distance, len(scene) * gap_distance**2, planar, max_nodes, time_limit
     )
     X_WO = RigidTransform(RotationMatrix.ProjectToRotationMatrix(X_OW[:3, :3]), X_OW[:3, 3])
     moved = scene @ X_OW[:3, :3].T + X_OW[:3, 3]
     squares = ((moved[:, None] - model) ** 2).sum(axis=2).min(axis=1)
-    inliers = squares <= max_distance**2
+    inliers = squares <= max_distance * max_distance
     residual = float(np.sqrt(squares[inliers].mean())) if inliers.any() else float("nan")
-    message = "" if closed else "a limit ended the search: better poses are not excluded"
+    status, message = RegistrationStatus.SUCCESS, ""
+    if not closed:
+        status = RegistrationStatus.NOT_CONVERGED
+        message = "a limit ended the search: better poses are not excluded"
+    elif not inliers.any():
+        status, message = RegistrationStatus.LOW_OVERLAP, "no scene point reaches the model"
+    elif _turns_free(scene[inliers]) or _turns_free(model):
+        status = RegistrationStatus.DEGENERATE
+        message = "the points lie on a line, or at one place, and leave turns free"
     return BranchAndBoundResult(
-        status=RegistrationStatus.SUCCESS if closed else RegistrationStatus.NOT_CONVERGED,
+        status=status,
         X_WO=X_WO.inverse(),
         residual=residual,
         inliers=inliers,
@@ -100,3 +112,12 @@ def branch_and_bound(
         lower_bound=lower_bound,
         nodes=nodes,
     )
+
+
+def _turns_free(points: NDArray[np.float64]) -> bool:
+    """Whether a turn moves none of the points: in space (N, 3) about a line that they lie on, in
+    the plane (z = 0 for all of them) about the place where all are."""
+    planar = not points[:, 2].any()
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    spread = np.pad(spread, (0, 3))
+    return bool(spread[0 if planar else 1] <= 1e-9 * max(spread[0], np.abs(points).max()))

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RotationMatrix
 from pydrake.solvers import CsdpSolver, MathematicalProgram
 
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.registration.gnc_rotation import gnc_rotation
 
 
@@ -74,9 +75,15 @@ def certify_rotation(
     estimate = gnc_rotation(model_vectors, scene_vectors, bound)
     model, scene = np.asarray(model_vectors, float), np.asarray(scene_vectors, float)
     candidate = estimate.R_WO if R_WO is None else np.asarray(R_WO, float)
-    if candidate.shape != (3, 3) or not np.allclose(candidate @ candidate.T, np.eye(3), atol=1e-6):
+    proper = candidate.shape == (3, 3) and bool(
+        np.allclose(candidate @ candidate.T, np.eye(3), atol=1e-6) and np.linalg.det(candidate) > 0
+    )
+    if not proper:
         raise ValueError("R_WO: not a rotation matrix")
-    Z, lower_bound, solved = _relaxation(_quaternion_forms(model, scene) / bound**2)
+    forms = _quaternion_forms(model / bound, scene / bound)
+    if not within(forms, FARTHEST):
+        raise ValueError(f"bound: {bound} is too small for vectors so long")
+    Z, lower_bound, solved = _relaxation(forms)
     rank_ratio = float("nan")
     if solved:
         values, vectors = np.linalg.eigh(Z[:4, :4])
@@ -103,8 +110,8 @@ def _cost(
     scene: NDArray[np.float64],
     bound: float,
 ) -> float:
-    squares = ((scene - model @ R.T) ** 2).sum(axis=1)
-    return float(np.minimum(squares / bound**2, 1).sum())
+    squares = (((scene - model @ R.T) / bound) ** 2).sum(axis=1)
+    return float(np.minimum(squares, 1).sum())
 
 
 def _quaternion_forms(
@@ -151,7 +158,10 @@ def _relaxation(forms: NDArray[np.float64]) -> tuple[NDArray[np.float64], float,
     for i, form in enumerate(forms, start=1):
         coupling = scale * (form - np.eye(4)) / 2
         program.AddLinearCost(coupling.ravel(), 0.0, Z[:4, 4 * i : 4 * i + 4].ravel())
-    result = CsdpSolver().Solve(program, None, None)
+    try:
+        result = CsdpSolver().Solve(program, None, None)
+    except RuntimeError:  # It gives up on numbers of too different size.
+        return np.zeros((4, 4)), float("nan"), False
     if not result.is_success():
         return np.zeros((4, 4)), float("nan"), False
     return np.asarray(result.GetSolution(Z), float), result.get_optimal_cost() / scale, True

@@ -136,6 +136,8 @@ def match_by_distances(
     candidates = np.asarray(all_pairs(len(model), len(scene)) if pairs is None else pairs)
     if candidates.ndim != 2 or candidates.shape[1] != 2:
         raise ValueError(f"pairs: expected shape (N, 2), not {candidates.shape}")
+    if candidates.size and not np.issubdtype(candidates.dtype, np.integer):
+        raise ValueError(f"pairs: expected whole numbers, not {candidates.dtype}")
     if len(candidates) and not (
         (candidates >= 0).all() and (candidates < [len(model), len(scene)]).all()
     ):

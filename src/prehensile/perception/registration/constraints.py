@@ -5,6 +5,7 @@ Noise and bad returns pull an unconstrained fit into them. Here the pose is foun
 optimization over rotations proper; :mod:`.convex_constraints` has the convex relaxations.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.linalg import null_space
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.registration.known import fit_rigid
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.sequential_qp import (
@@ -24,6 +26,9 @@ from prehensile.perception.registration.sequential_qp import (
 )
 
 Array = NDArray[np.float64]
+
+
+_MOST_STARTS = 100_000
 
 
 class HalfSpaces(NamedTuple):
@@ -58,14 +63,16 @@ class HalfSpaces(NamedTuple):
             ValueError: if shapes disagree, a number is not finite or a normal is zero.
         """
         normals, offsets = np.asarray(self.normals, float), np.asarray(self.offsets, float)
-        if normals.shape != (len(offsets), dimensions) or offsets.ndim != 1:
+        if offsets.ndim != 1 or normals.shape != (len(offsets), dimensions):
             raise ValueError(
                 f"half_spaces: normals {normals.shape} and offsets {offsets.shape} must be "
                 f"(k, {dimensions}) and (k,)"
             )
         length = np.linalg.norm(normals, axis=1)
-        if not (np.isfinite(normals).all() and np.isfinite(offsets).all() and (length > 0).all()):
+        if not (within(normals, FARTHEST) and np.isfinite(offsets).all() and (length > 0).all()):
             raise ValueError("half_spaces: must be finite, and no normal zero")
+        if not within(offsets / length, FARTHEST):
+            raise ValueError(f"half_spaces: a plane lies beyond {FARTHEST:g} m")
         return normals / length[:, None], offsets / length
 
 
@@ -137,7 +144,7 @@ def fit_rigid_constrained(
         constrained_points: (M, d) points of O that must be there; the model points if None.
         weights: (N,) >= 0; all 1 if None.
         X_WO_guess: one more start.
-        num_starts: starts without the guess, >= 1.
+        num_starts: starts without the guess, 1 to 100 000.
         seed: of the random starts.
 
     Returns:
@@ -149,8 +156,10 @@ def fit_rigid_constrained(
     Raises:
         ValueError: if an argument has a wrong shape or is not finite.
     """
-    if num_starts < 1:
-        raise ValueError(f"num_starts: must be at least 1, not {num_starts}")
+    if not 1 <= num_starts <= _MOST_STARTS:
+        raise ValueError(f"num_starts: must be 1 to {_MOST_STARTS}, not {num_starts}")
+    if X_WO_guess is not None and not np.isfinite(X_WO_guess.translation()).all():
+        raise ValueError("X_WO_guess: must be finite")
     unconstrained = fit_rigid(model_points, scene_points, weights)
     model, scene = np.asarray(model_points, float), np.asarray(scene_points, float)
     dimensions = model.shape[1]
@@ -194,7 +203,12 @@ def fit_rigid_constrained(
             message="no pose was found that keeps the object inside the half-spaces",
         )
     residual_freedom = dimensions * int((w > 0).sum())
-    return _answer(moments, w > 0, residual_freedom, best, basis, scale)
+    answer = _answer(moments, w > 0, residual_freedom, best, basis, scale)
+    if answer.succeeded and not unconstrained.succeeded and not len(best.active):
+        # Points that coincide in the scene, say: the distances stay the same for any turn.
+        message = "other poses fit these points equally well"
+        answer = replace(answer, status=RegistrationStatus.DEGENERATE, message=message)
+    return answer
 
 
 def corner_points(constrained_points: ArrayLike | None, model: Array) -> Array:
@@ -211,8 +225,8 @@ def corner_points(constrained_points: ArrayLike | None, model: Array) -> Array:
             raise ValueError(
                 f"constrained_points: expected (M, {model.shape[1]}), not {points.shape}"
             )
-        if not np.isfinite(points).all():
-            raise ValueError("constrained_points: must be finite")
+        if not within(points, FARTHEST):
+            raise ValueError(f"constrained_points: must be finite, none beyond {FARTHEST:g}")
     try:
         return points[ConvexHull(points).vertices]
     except QhullError:  # Flat, or too few: all of them.

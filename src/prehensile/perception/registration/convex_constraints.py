@@ -103,6 +103,8 @@ def fit_rigid_convex(
         raise ValueError(f"relaxation: must be 'convex_hull' or 'columns', not {relaxation!r}")
     if objective not in ("distances", "correlation"):
         raise ValueError(f"objective: must be 'distances' or 'correlation', not {objective!r}")
+    if not tight >= 0:
+        raise ValueError(f"tight: must be at least 0, not {tight}")
     unconstrained = fit_rigid(model_points, scene_points, weights)
     model, scene = np.asarray(model_points, float), np.asarray(scene_points, float)
     d = model.shape[1]

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.native import _core
 from prehensile.native.kd_tree import KdTree
-from prehensile.perception.cloud import PointCloud, rotate
+from prehensile.perception.cloud import FARTHEST, PointCloud, rotate, within
 from prehensile.perception.registration.known import fit_rigid
 from prehensile.perception.registration.point_drift import bounding_volume
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
@@ -55,7 +55,7 @@ class FilterRegConfig:
     max_iterations: int = 200
     tolerance: float = 1e-5
     min_overlap: float = 0.3
-    min_eigenvalue_ratio: float = 1e-3
+    min_eigenvalue_ratio: float = 5e-3
 
 
 def filter_registration(
@@ -89,6 +89,8 @@ def filter_registration(
     """
     config = config or FilterRegConfig()
     _check(scene, model, config)
+    if not within(X_WO_guess.translation(), FARTHEST):
+        raise ValueError("X_WO_guess: must be finite")
     order = _core.spatial_order(model.points)
     points = model.points[order]
     normals = model.require_normals()[order] if config.point_to_plane else None
@@ -174,11 +176,16 @@ def _check(scene: PointCloud, model: PointCloud, config: FilterRegConfig) -> Non
         raise ValueError(f"outlier_weight: must be in [0, 1), not {config.outlier_weight}")
     for name in ("outlier_volume", "sigma", "min_sigma"):
         value = getattr(config, name)
-        if value is not None and not (value > 0 and np.isfinite(value)):
-            raise ValueError(f"{name}: must be positive and finite, not {value}")
+        if value is not None and not 0 < value <= FARTHEST:
+            raise ValueError(f"{name}: must be positive and at most {FARTHEST:g}, not {value}")
+    for name in ("min_overlap", "min_eigenvalue_ratio"):
+        if not 0 <= getattr(config, name) <= 1:
+            raise ValueError(f"{name}: must be from 0 to 1, not {getattr(config, name)}")
+    if not config.tolerance >= 0:
+        raise ValueError(f"tolerance: must be at least 0, not {config.tolerance}")
     if not 0 < config.shrinkage <= 1:
         raise ValueError(f"shrinkage: must be in (0, 1], not {config.shrinkage}")
-    if config.max_iterations < 1:
+    if not config.max_iterations >= 1:
         raise ValueError(f"max_iterations: must be at least 1, not {config.max_iterations}")
 
 

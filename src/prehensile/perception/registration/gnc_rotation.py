@@ -42,7 +42,7 @@ def gnc_rotation(
         model_vectors: (N, 3) in O, N >= 1.
         scene_vectors: (N, 3), the partner of each in W.
         bound: greatest error of a right one, > 0, in the vectors' unit.
-        max_iterations: of weighted least squares.
+        max_iterations: of weighted least squares, at least 1.
 
     Returns:
         The rotation.
@@ -51,6 +51,13 @@ def gnc_rotation(
         ValueError: if shapes disagree, there is no vector, or a number is not finite or out of
             range.
     """
+    if max_iterations < 1:
+        raise ValueError(f"max_iterations: must be at least 1, not {max_iterations}")
+    if np.shape(model_vectors) != np.shape(scene_vectors):
+        raise ValueError(
+            f"scene_vectors: expected shape {np.shape(model_vectors)} as model_vectors, not "
+            f"{np.shape(scene_vectors)}"
+        )
     R, inliers, cost, iterations, converged = _core.gnc_rotation(
         model_vectors, scene_vectors, bound, max_iterations
     )

@@ -16,7 +16,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from prehensile.native import _core
 from prehensile.perception.cloud import PointCloud
 from prehensile.perception.registration.losses import RobustLoss
-from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
+from prehensile.perception.registration.result import (
+    RegistrationResult,
+    RegistrationStatus,
+    residual_limit,
+)
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
 
@@ -61,12 +65,16 @@ class IcpConfig:
         color_weight: the part in [0, 1) of squared differences of grey values (0 to 1) in the sum
             (Park, Zhou and Koltun, "Colored point cloud registration revisited", ICCV 2017; theirs
             is 0.032). Both clouds must have colors.
-        coarse_points: the first steps are made with about so many points of the scene, evenly taken,
-            until they become small; 0: with all.
+        coarse_points: the first steps are made with about so many points of the scene, evenly
+            taken, until they become small; 0: with all.
         max_iterations: at least 1.
         tolerance: done when a step moves the points by less, root mean square [m].
         min_overlap: fewer inliers than this part of the scene: ``LOW_OVERLAP``, 0 to 1.
-        min_eigenvalue_ratio: weaker constraints than this, of the strongest: ``DEGENERATE``.
+        max_residual: a larger residual (root mean square, in the end) is no fit: ``LOW_OVERLAP``
+            [m]; None: a quarter of the model's root mean square radius, as clouds leave that do not
+            resemble the model.
+        min_eigenvalue_ratio: weaker constraints than this, of the strongest: ``DEGENERATE``. That
+            partners lie beside the points feigns some, less so in denser models.
     """
 
     kind: IcpKind = IcpKind.POINT_TO_PLANE
@@ -82,7 +90,8 @@ class IcpConfig:
     max_iterations: int = 100
     tolerance: float = 1e-5
     min_overlap: float = 0.3
-    min_eigenvalue_ratio: float = 1e-3
+    max_residual: float | None = None
+    min_eigenvalue_ratio: float = 5e-3
 
 
 class IcpModel:
@@ -122,20 +131,21 @@ def icp(
         history: the pose before every step and the last one are appended to it.
 
     Returns:
-        The pose. ``LOW_OVERLAP`` and no pose if too few points have partners in reach.
-        ``DEGENERATE`` is judged by the distances from tangent planes, whatever the kind: along a
-        plane a model can slide. The covariance supposes errors of the points that are independent
-        and as large as the residuals.
+        The pose. ``LOW_OVERLAP`` and no pose if too few points have partners in reach; with a pose,
+        if too few are inliers or the residual is no fit's. ``DEGENERATE`` is judged by the
+        distances from tangent planes, whatever the kind: along a plane a model can slide. The
+        covariance supposes errors of the points that are independent and as large as the residuals.
 
     Raises:
         ValueError: if a cloud is empty, a setting is out of range, or the clouds lack the colors
             that the configuration needs; the message names it.
     """
     config = config or IcpConfig()
-    (found,) = _run(scene, _prepared(model), [X_WO_guess], config, 1, history is not None)
+    prepared = _prepared(model)
+    (found,) = _run(scene, prepared, [X_WO_guess], config, 1, history is not None)
     if history is not None:
         history.extend(_pose(X) for X in found["history"])
-    return _result(found, config)
+    return _result(found, config, prepared)
 
 
 def icp_many_starts(
@@ -174,11 +184,13 @@ def icp_many_starts(
         raise ValueError("guesses: there is none")
     if not ambiguity_ratio >= 1:
         raise ValueError(f"ambiguity_ratio: must be at least 1, not {ambiguity_ratio}")
+    if distinct_distance is not None and not distinct_distance >= 0:
+        raise ValueError(f"distinct_distance: must be at least 0, not {distinct_distance}")
     config = config or IcpConfig()
     prepared = _prepared(model)
     found = _run(scene, prepared, guesses, config, num_threads, False)
     best = min(found, key=lambda one: one["score"])
-    result = _result(best, config)
+    result = _result(best, config, prepared)
     points = prepared.cloud.points
     mean = points.mean(axis=0)
     moments = (points - mean).T @ (points - mean) / len(points)
@@ -232,6 +244,8 @@ def _run(
         value = getattr(config, name)
         if not 0 <= value <= 1:
             raise ValueError(f"{name}: must be from 0 to 1, not {value}")
+    if config.max_residual is not None and not config.max_residual > 0:
+        raise ValueError(f"max_residual: must be positive, not {config.max_residual}")
     native_scene = _native_cloud(
         scene,
         "scene",
@@ -259,7 +273,7 @@ def _run(
     )
 
 
-def _result(found: dict[str, Any], config: IcpConfig) -> RegistrationResult:
+def _result(found: dict[str, Any], config: IcpConfig, model: IcpModel) -> RegistrationResult:
     """What the kernel found, judged."""
     inliers = found["inliers"].astype(bool)
     iterations = found["iterations"]
@@ -276,6 +290,7 @@ def _result(found: dict[str, Any], config: IcpConfig) -> RegistrationResult:
     status, message = RegistrationStatus.SUCCESS, ""
     covariance, free = None, None
     overlap = float(inliers.mean())
+    limit = residual_limit(model.cloud.points, config.max_residual)
     length_scale = found["length_scale"]
     if length_scale > 0:
         covariance, free = uncertainty_about(
@@ -291,6 +306,9 @@ def _result(found: dict[str, Any], config: IcpConfig) -> RegistrationResult:
     elif free is None or len(free):
         status = RegistrationStatus.DEGENERATE
         message = "the geometry leaves motions free"
+    elif not found["residual"] <= limit:
+        status = RegistrationStatus.LOW_OVERLAP
+        message = f"the partners lie {found['residual']:.3g} m apart: no fit"
     elif found["outcome"] == "out_of_iterations":
         status = RegistrationStatus.NOT_CONVERGED
         message = f"still moving after {iterations} iterations"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
@@ -134,7 +135,7 @@ def fit_rotation(
     Raises:
         ValueError: if shapes disagree, there is no vector, or a number is not finite.
     """
-    model, scene, w = _pairs(model_vectors, scene_vectors, weights)
+    model, scene, w = _pairs(model_vectors, scene_vectors, weights, "vectors")
     R, information, determined = _rotation(model, scene, w, model, scene)
     p = np.zeros(model.shape[1])
     return _fit(R, p, model, scene, w, information, determined)
@@ -174,23 +175,28 @@ def fit_translation(
 
 
 def _pairs(
-    model_points: ArrayLike, scene_points: ArrayLike, weights: ArrayLike | None
+    model_points: ArrayLike,
+    scene_points: ArrayLike,
+    weights: ArrayLike | None,
+    kind: str = "points",
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """The arguments as arrays, checked."""
     model = np.asarray(model_points, dtype=float)
     scene = np.asarray(scene_points, dtype=float)
     if model.ndim != 2 or model.shape[1] not in (2, 3):
-        raise ValueError(f"model_points: expected shape (N, 2) or (N, 3), not {model.shape}")
+        raise ValueError(f"model_{kind}: expected shape (N, 2) or (N, 3), not {model.shape}")
     if scene.shape != model.shape:
-        raise ValueError(f"scene_points: expected shape {model.shape}, not {scene.shape}")
+        raise ValueError(
+            f"scene_{kind}: expected as many as model_{kind}, {model.shape}, not {scene.shape}"
+        )
     if not len(model):
-        raise ValueError("model_points: there is no point")
+        raise ValueError(f"model_{kind}: there is none")
     w = np.ones(len(model)) if weights is None else np.asarray(weights, dtype=float)
     if w.shape != (len(model),):
         raise ValueError(f"weights: expected shape {(len(model),)}, not {w.shape}")
-    for name, array in (("model_points", model), ("scene_points", scene), ("weights", w)):
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name}: must be finite")
+    for name, array in ((f"model_{kind}", model), (f"scene_{kind}", scene), ("weights", w)):
+        if not within(array, FARTHEST):
+            raise ValueError(f"{name}: must be finite, and none beyond {FARTHEST:g}")
     if (w < 0).any() or not w.any():
         raise ValueError("weights: must be at least 0 and not all 0")
     return model, scene, w
@@ -215,10 +221,11 @@ def _rotation(
     turns = np.array([signed.sum()]) if len(s) == 2 else signed.sum() - signed
     axes = np.eye(1) if len(s) == 2 else U
     # Rounding: of the products, and of the coordinates before a mean was taken off.
-    spread = np.sqrt((w @ (model**2).sum(axis=1)) * (w @ (scene**2).sum(axis=1)))
+    spread = np.sqrt(w @ (model**2).sum(axis=1)) * np.sqrt(w @ (scene**2).sum(axis=1))
     size = max(np.abs(raw_model).max(), np.abs(raw_scene).max())
     rounding = 1e-15 * size * w.sum() * (np.abs(model).max() + np.abs(scene).max())
-    determined = bool(turns.min() > _RANK_TOLERANCE * spread + 10 * rounding)
+    # The last number stands for what is lost below the least numbers there are.
+    determined = bool(turns.min() > _RANK_TOLERANCE * spread + 10 * rounding + 1e-280 * w.max())
     return (U * signs) @ Vt, (axes * turns) @ axes.T, determined
 
 

@@ -9,10 +9,11 @@ from pydrake.math import RigidTransform
 
 from prehensile.errors import InputError
 from prehensile.native import _core
-from prehensile.perception.cloud import PointCloud
+from prehensile.perception.cloud import PointCloud, within
 from prehensile.perception.free_space import DepthView
 from prehensile.perception.fusion import downsample
 from prehensile.perception.normals import estimate_normals
+from prehensile.perception.ranges import require_ranges
 from prehensile.perception.registration.evidence import (
     Evidence,
     EvidenceConfig,
@@ -57,22 +58,20 @@ class LocateConfig(EvidenceConfig):
         Raises:
             ValueError: naming the field that is out of range.
         """
-        limits = {
-            "voxel_fraction": (1e-3, 0.2),
-            "num_references": (1, 10**6),
-            "max_candidates": (1, 10**4),
-            "max_finalists": (1, 10**3),
-            "tolerance": (1e-6, 1.0),
-            "max_normal_angle": (0.01, np.pi),
-            "min_coverage": (0.0, 1.0),
-            "min_agreement": (0.0, 1.0),
-            "min_score": (0.0, 1.0),
-            "max_violation": (0.0, 1.0),
-            "ambiguity": (0.0, 1e6),
-        }
-        for name, (low, high) in limits.items():
-            if not low <= getattr(self, name) <= high:
-                raise ValueError(f"{name}: must lie in [{low}, {high}], not {getattr(self, name)}")
+        require_ranges(
+            self,
+            voxel_fraction=(1e-3, 0.2),
+            num_references=(1, 10**6),
+            max_candidates=(1, 10**4),
+            max_finalists=(1, 10**3),
+            tolerance=(1e-6, 1.0),
+            max_normal_angle=(0.01, np.pi),
+            min_coverage=(0.0, 1.0),
+            min_agreement=(0.0, 1.0),
+            min_score=(0.0, 1.0),
+            max_violation=(0.0, 1.0),
+            ambiguity=(0.0, 1e6),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +139,8 @@ def locate(
     """
     config = config or LocateConfig()
     voxel = config.voxel_fraction * model.diameter
+    if not within(scene.points, 2**20 * voxel / 3):
+        raise ValueError("scene: has points beyond the reach of its voxels; crop it first")
     thinned = _thinned(scene, voxel, num_threads)
     if len(thinned) < 10:
         return _nothing(scene, f"the scene has only {len(thinned)} points with normals")

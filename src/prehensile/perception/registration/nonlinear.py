@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import minimize
 
-from prehensile.perception.cloud import PointCloud, rotate
+from prehensile.perception.cloud import FARTHEST, PointCloud, rotate, within
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.registration.losses import RobustLoss
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
@@ -21,7 +21,6 @@ Constraint = Callable[[RigidTransform], NDArray[np.float64]]
 
 _FEWEST_POINTS = 6
 _STEP = 1e-6  # Of the finite differences of constraints, in units of the variables.
-_FREE_MOTION = 1e-4
 
 
 def estimate_pose_nonlinear(
@@ -56,7 +55,8 @@ def estimate_pose_nonlinear(
         scale: of a named loss [m].
         max_iterations: of the optimizer.
         tolerance: at which the optimizer stops: of the gradient of the mean loss without
-            constraints, of its change with them; relative to scale^2.
+            constraints, of its change with them; relative to scale^2 (or to the square of the
+            scene's size, if that is smaller).
         inlier_distance: a point no further from the model is an inlier [m]; None for 3 scales.
         min_overlap: least part of the scene that must be inliers.
 
@@ -67,9 +67,17 @@ def estimate_pose_nonlinear(
     Raises:
         ValueError: naming the argument that is out of range.
     """
-    for name, value in (("scale", scale), ("tolerance", tolerance)):
-        if not (value > 0 and np.isfinite(value)):
-            raise ValueError(f"{name}: must be positive and finite, not {value}")
+    for name, value, least in (("scale", scale, 1e-9), ("tolerance", tolerance, 0.0)):
+        if not (value > least and np.isfinite(value)):
+            raise ValueError(f"{name}: must be above {least:g} and finite, not {value}")
+    if not max_iterations >= 1:
+        raise ValueError(f"max_iterations: must be at least 1, not {max_iterations}")
+    if not 0 <= min_overlap <= 1:
+        raise ValueError(f"min_overlap: must be from 0 to 1, not {min_overlap}")
+    if inlier_distance is not None and not inlier_distance > 0:
+        raise ValueError(f"inlier_distance: must be positive, not {inlier_distance}")
+    if not within(X_WO_guess.translation(), FARTHEST):
+        raise ValueError("X_WO_guess: must be finite")
     if len(scene) < _FEWEST_POINTS:
         none = np.zeros(len(scene), dtype=bool)
         text = f"{len(scene)} points do not determine a pose"
@@ -89,6 +97,9 @@ def estimate_pose_nonlinear(
         R = _exp(x[:3])
         return RigidTransform(RotationMatrix(R @ R_guess), mean + length * x[3:] + R @ p_guess)
 
+    # A scale beyond the scene's size would make every slope look small.
+    unit = min(scale, length) ** 2 * len(scene)
+
     def cost(x: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         X_WO = pose(x)
         d, g_W, _ = _look_up(scene, field, X_WO)
@@ -98,7 +109,6 @@ def estimate_pose_nonlinear(
         force = -np.asarray(slopes)[:, None] * g_W
         turn = np.cross(scene.points - mean - length * x[3:], force).sum(axis=0)
         gradient = np.concatenate([_left_jacobian(x[:3]).T @ turn, length * force.sum(axis=0)])
-        unit = scale * scale * len(scene)
         return float(np.sum(losses)) / unit, gradient / unit
 
     def violations(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -136,9 +146,7 @@ def estimate_pose_nonlinear(
         g = g_W[inliers]
         J = np.concatenate([np.cross(scene.points[inliers] - mean, g), g], axis=1)
         variance = float(np.square(d[inliers]).sum()) / (count - _FEWEST_POINTS)
-        covariance, free = uncertainty_about(
-            J.T @ J, variance, length, X_WO.translation() - mean, _FREE_MOTION
-        )
+        covariance, free = uncertainty_about(J.T @ J, variance, length, X_WO.translation() - mean)
     if worst < -1e-6:
         status = RegistrationStatus.INFEASIBLE
         message = f"a constraint is {worst:.3g} in the end: {answer.message}"

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from prehensile.native.kd_tree import KdTree
+from prehensile.perception.cloud import FARTHEST, within
 from prehensile.perception.registration.known import fit_rigid
 from prehensile.perception.registration.point_drift import PointDriftConfig, drift
-from prehensile.perception.registration.result import RegistrationStatus
+from prehensile.perception.registration.result import RegistrationStatus, residual_limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,8 @@ class PlanarResult:
 
     Attributes:
         status: ``SUCCESS``, ``NOT_CONVERGED``, ``DEGENERATE`` (the partners fix no rotation) or
-            ``LOW_OVERLAP`` (no pose: fewer than two points have partners).
+            ``LOW_OVERLAP`` (no pose: fewer than two points have partners; or with a pose that is no
+            fit).
         X_WO: (3, 3) the pose; None where there is none.
         residual: root mean square distance of the inliers from their partners [m].
         inliers: (N,) bool, which scene points took part.
@@ -164,14 +166,16 @@ def point_drift_2d(
             RegistrationStatus.LOW_OVERLAP, None, np.nan, inliers, iterations, history
         )
     scale = found["num_explained"] * max(found["length_scale"], 1e-12) ** 2
+    residual = float(np.sqrt(2) * found["sigma"])
     status = RegistrationStatus.SUCCESS
     if found["num_explained"] < config.min_overlap * len(s):
         status = RegistrationStatus.LOW_OVERLAP
     elif found["rotation_information"][2, 2] <= config.min_eigenvalue_ratio * scale:
         status = RegistrationStatus.DEGENERATE
+    elif not residual <= residual_limit(m, config.max_residual):
+        status = RegistrationStatus.LOW_OVERLAP
     elif not found["converged"]:
         status = RegistrationStatus.NOT_CONVERGED
-    residual = float(np.sqrt(2) * found["sigma"])
     return PlanarResult(status, history[-1].X_WO, residual, inliers, iterations, history)
 
 
@@ -185,8 +189,8 @@ def _arguments(
             raise ValueError(f"{name}: expected shape (N, 2), not {points.shape}")
         if len(points) < least:
             raise ValueError(f"{name}: needs at least {least} points, not {len(points)}")
-        if not np.isfinite(points).all():
-            raise ValueError(f"{name}: must be finite")
+        if not within(points, FARTHEST):
+            raise ValueError(f"{name}: must be finite, and none beyond {FARTHEST:g}")
     rigid = X.shape == (3, 3) and bool(
         np.abs(X[:2, :2] @ X[:2, :2].T - np.eye(2)).max() < 1e-6
         and np.linalg.det(X[:2, :2]) > 0

@@ -13,7 +13,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.native import _core
 from prehensile.perception.cloud import PointCloud
-from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
+from prehensile.perception.registration.result import (
+    RegistrationResult,
+    RegistrationStatus,
+    residual_limit,
+)
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
 
@@ -32,6 +36,8 @@ class PointDriftConfig:
         tolerance: done when a step moves the points, root mean square, and changes sigma by less
             [m].
         min_overlap: a smaller part of the scene explained: ``LOW_OVERLAP``, 0 to 1.
+        max_residual: a larger residual is no fit: ``LOW_OVERLAP`` [m]; None: a quarter of the
+            model's root mean square radius.
         min_eigenvalue_ratio: a weaker constraint, of the strongest: ``DEGENERATE``.
     """
 
@@ -41,6 +47,7 @@ class PointDriftConfig:
     max_iterations: int = 200
     tolerance: float = 1e-6
     min_overlap: float = 0.3
+    max_residual: float | None = None
     min_eigenvalue_ratio: float = 1e-4
 
 
@@ -109,19 +116,23 @@ def coherent_point_drift(
         config.min_eigenvalue_ratio,
     )
     overlap = found["num_explained"] / len(scene)
+    residual = float(np.sqrt(3) * found["sigma"])
     status, message = RegistrationStatus.SUCCESS, ""
     if overlap < config.min_overlap:
         status = RegistrationStatus.LOW_OVERLAP
         message = f"only {overlap:.0%} of the scene belong to the model"
     elif len(free):
         status, message = RegistrationStatus.DEGENERATE, "the points leave turns free"
+    elif not residual <= residual_limit(model.points, config.max_residual):
+        status = RegistrationStatus.LOW_OVERLAP
+        message = f"the partners lie {residual:.3g} m apart: no fit"
     elif not found["converged"]:
         status = RegistrationStatus.NOT_CONVERGED
         message = f"still moving after {found['iterations']} iterations"
     return RegistrationResult(
         status=status,
         X_WO=X_WO,
-        residual=float(np.sqrt(3) * found["sigma"]),
+        residual=residual,
         inliers=inliers,
         iterations=found["iterations"],
         covariance=covariance,
@@ -147,8 +158,13 @@ def drift(
     for name, points in (("scene", scene), ("model", model)):
         if not len(points):
             raise ValueError(f"{name}: there is no point")
-    if config.sigma is not None and not config.sigma > 0:
-        raise ValueError(f"sigma: must be positive, not {config.sigma}")
+    for key in ("sigma", "max_residual"):
+        value = getattr(config, key)
+        if value is not None and not value > 0:
+            raise ValueError(f"{key}: must be positive, not {value}")
+    for key in ("min_overlap", "min_eigenvalue_ratio"):
+        if not 0 <= getattr(config, key) <= 1:
+            raise ValueError(f"{key}: must be from 0 to 1, not {getattr(config, key)}")
     volume = config.outlier_volume
     return _core.coherent_point_drift(
         scene,
@@ -170,7 +186,8 @@ def bounding_volume(points: NDArray[np.float64]) -> float:
     hundredth of the longest, so that flat clouds have a volume."""
     sides = np.ptp(points, axis=0)
     longest = float(sides.max())
-    return float(np.prod(np.maximum(sides, 0.01 * longest))) if longest > 0 else 1.0
+    volume = float(np.prod(np.maximum(sides, 0.01 * longest)))
+    return volume if volume > 0 else 1.0
 
 
 def _pose(matrix: NDArray[np.float64]) -> RigidTransform:

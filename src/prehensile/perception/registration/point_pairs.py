@@ -43,6 +43,8 @@ class PointPairModel:
     """
 
     def __init__(self, cloud: PointCloud, distance_step: float | None = None) -> None:
+        if len(cloud) < 2:
+            raise ValueError(f"cloud: needs at least two points, not {len(cloud)}")
         if distance_step is None:
             distance_step = 0.05 * float(np.linalg.norm(np.ptp(cloud.points, axis=0)))
         self._table = _core.PointPairTable(cloud.points, cloud.require_normals(), distance_step)

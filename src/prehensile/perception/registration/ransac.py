@@ -48,6 +48,8 @@ def ransac_pose(
     Raises:
         ValueError: if shapes disagree, or a number is not finite or out of range.
     """
+    if not max_false_alarms > 0:
+        raise ValueError(f"max_false_alarms: must be positive, not {max_false_alarms}")
     X, flags, count, samples, _, confident, false_alarms = _core.ransac_pose(
         model_points, scene_points, max_distance, seed, max_samples, confidence
     )

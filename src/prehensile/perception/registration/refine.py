@@ -10,13 +10,14 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from prehensile.native import _core
-from prehensile.perception.cloud import PointCloud
+from prehensile.perception.cloud import FARTHEST, PointCloud, within
 from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.registration.losses import RobustLoss
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
 _FEWEST_POINTS = 6
+_EXACT = 0.05  # Of the scale: root mean square distances that are as good as none.
 _TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 
 
@@ -46,8 +47,9 @@ class RefineConfig:
         tolerance: an iteration that moves the points by less ends the refinement [m].
         inlier_distance: a point no further from the model is an inlier [m]; None for 3 scales.
         min_overlap: least part of the scene that must be inliers.
-        ambiguity: poses whose mean loss exceeds the best one's by less than this part of it, and
-            that lie further from it than 5 % of the object's diameter, make the result ambiguous.
+        ambiguity: poses whose mean loss exceeds the best one's by less than this part of it (or by
+            next to nothing), and that lie further from it than 5 % of the object's diameter, make
+            the result ambiguous.
     """
 
     loss: RobustLoss = RobustLoss.GEMAN_MCCLURE
@@ -114,8 +116,10 @@ def refine_pose(
         InputError: if normals are asked for and the scene has none.
     """
     config = config or RefineConfig()
+    if not within(X_WO_guess.translation(), FARTHEST):
+        raise ValueError("X_WO_guess: must be finite")
     starts = [X_WO_guess]
-    if config.spread:
+    if 0 < config.spread <= np.pi:  # Else none, or an error.
         low, size = field.origin, np.array(field.shape) - 1
         centre = low + 0.5 * field.spacing * size
         for axis in _TETRAHEDRON:
@@ -143,6 +147,8 @@ def refine_poses(
     """
     if not X_WO_guesses:
         raise ValueError("X_WO_guesses: none")
+    if not all(within(X.translation(), FARTHEST) for X in X_WO_guesses):
+        raise ValueError("X_WO_guesses: must be finite")
     return _refine(
         scene, field, X_WO_guesses, config or RefineConfig(), num_threads, judge_ambiguity=True
     )
@@ -157,6 +163,16 @@ def _refine(
     *,
     judge_ambiguity: bool,
 ) -> RefinedPoses:
+    if not 0 <= config.min_overlap <= 1:
+        raise ValueError(f"min_overlap: must be from 0 to 1, not {config.min_overlap}")
+    if config.num_coarse_points < 1:
+        raise ValueError(f"num_coarse_points: must be at least 1, not {config.num_coarse_points}")
+    if not config.ambiguity >= 0:
+        raise ValueError(f"ambiguity: must be at least 0, not {config.ambiguity}")
+    if config.inlier_distance is not None and not config.inlier_distance > 0:
+        raise ValueError(f"inlier_distance: must be positive, not {config.inlier_distance}")
+    if not 0 <= config.spread <= np.pi:
+        raise ValueError(f"spread: must be from 0 to pi, not {config.spread}")
     if len(scene) < _FEWEST_POINTS:
         none = np.zeros(len(scene), dtype=bool)
         message = f"{len(scene)} points do not determine a pose"
@@ -247,7 +263,9 @@ def _is_rival(
     """Whether a start ended far from the best one and explains the scene about as well."""
     # Costs on few points vary by their choice: they are compared with more generosity.
     slack = config.ambiguity if answers[i][5] else 2 * config.ambiguity
-    if i == winner or answers[i][1] > (1 + slack) * answers[winner][1]:
+    # Without noise, costs are those of interpolation, which differ without meaning.
+    least = (_EXACT * config.scale) ** 2
+    if i == winner or answers[i][1] > (1 + slack) * answers[winner][1] + least:
         return False
     low = field.origin
     high = low + field.spacing * (np.array(field.shape) - 1)

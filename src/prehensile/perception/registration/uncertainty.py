@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from prehensile.perception.registration.result import pose_uncertainty
+from prehensile.perception.registration.result import MIN_EIGENVALUE_RATIO, pose_uncertainty
 
 
 def uncertainty_about(
@@ -11,7 +11,7 @@ def uncertainty_about(
     variance: float,
     length_scale: float,
     p_CO_W: NDArray[np.float64],
-    min_eigenvalue_ratio: float = 1e-4,
+    min_eigenvalue_ratio: float = MIN_EIGENVALUE_RATIO,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Covariance and free directions of a pose, judged about a point C amid the data.
 

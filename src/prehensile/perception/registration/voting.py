@@ -43,8 +43,11 @@ def vote(values: ArrayLike, bounds: ArrayLike, *, most_inliers: bool = False) ->
     Raises:
         ValueError: if there is no value, or a number is not finite or out of range.
     """
-    array = np.asarray(values, float)
-    return _vote(_core.vote(array, np.broadcast_to(bounds, array.shape), most_inliers))
+    array, errors = np.asarray(values, float), np.asarray(bounds, float)
+    if errors.shape not in ((), array.shape):
+        raise ValueError(f"bounds: expected one or {array.shape}, not {errors.shape}")
+    errors = np.broadcast_to(errors, array.shape)
+    return _vote(_core.vote(array, errors, most_inliers), "bounds")
 
 
 def vote_for_scale(model_points: ArrayLike, scene_points: ArrayLike, noise_bound: float) -> Vote:
@@ -65,9 +68,11 @@ def vote_for_scale(model_points: ArrayLike, scene_points: ArrayLike, noise_bound
         ValueError: if shapes disagree, a number is not finite or out of range, or all model points
             lie within the noise of each other.
     """
-    return _vote(_core.vote_for_scale(model_points, scene_points, noise_bound))
+    return _vote(_core.vote_for_scale(model_points, scene_points, noise_bound), "noise_bound")
 
 
-def _vote(native: tuple[float, NDArray[np.uint8], float]) -> Vote:
+def _vote(native: tuple[float, NDArray[np.uint8], float], bounds: str) -> Vote:
     estimate, inliers, cost = native
+    if not np.isfinite(estimate):
+        raise ValueError(f"{bounds}: so small or large that weights are not finite")
     return Vote(estimate, inliers.view(bool), cost)
