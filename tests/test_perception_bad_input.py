@@ -59,6 +59,7 @@ from prehensile.perception.registration import (
     IcpConfig,
     IcpDirection,
     IcpKind,
+    IcpModel,
     KnownObject,
     LocateConfig,
     PointDriftConfig,
@@ -645,3 +646,37 @@ def test_images_without_measurements_give_nothing():
         assert not free_space_violation(POINTS + [0, 0, 0.3], view).any()
     with pytest.raises(ValueError, match="X_WC"):
         fuse([DEPTH], [PosedCamera(CAMERA, X_NAN)], REGION, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "trials"),
+    [
+        (lambda scene, model: fit_rigid(model.points, scene.points).result(), 100),
+        (lambda scene, model: refine_pose(scene, box_field(), X_GUESS), 80),
+        (lambda scene, model: icp(scene, dense_box(), X_GUESS), 40),
+        (lambda scene, model: register_correspondences(model.points, scene.points, 0.004), 80),
+    ],
+    ids=["fit_rigid", "refine_pose", "icp", "register_correspondences"],
+)
+def test_poses_err_as_their_covariance_says(estimate, trials):
+    rng = np.random.default_rng(3)
+    model = box_cloud(300, seed=7)
+    X_WO = RigidTransform(RollPitchYaw(0.03, -0.02, 0.05), [0.002, 0.001, 0.003])
+    surprise = []
+    for _ in range(trials):
+        scene = model.transformed(X_WO)
+        scene = scene.replace(points=scene.points + rng.normal(scale=0.001, size=(300, 3)))
+        result = estimate(scene, model)
+        assert result.succeeded
+        X_error = result.X_WO @ X_WO.inverse()
+        angle_axis = X_error.rotation().ToAngleAxis()
+        shift = result.X_WO.translation() - X_WO.translation()
+        error = np.concatenate([angle_axis.angle() * angle_axis.axis(), shift])
+        surprise.append(error @ np.linalg.solve(result.covariance, error))
+    # Of mean 6 if the covariance is right.
+    assert 0.6 < np.mean(surprise) / 6 < 1.8
+
+
+@functools.cache
+def dense_box() -> IcpModel:
+    return IcpModel(box_cloud(6000, seed=9))

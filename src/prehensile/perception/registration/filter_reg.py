@@ -80,8 +80,9 @@ def filter_registration(
         num_threads: at least 1; it does not change the result.
 
     Returns:
-        The pose. Inliers are scene points within three sigma of the model. ``LOW_OVERLAP`` and no
-        pose if no model point is near the scene.
+        The pose. Its covariance counts the points as independent, and knows nothing of the bias
+        that clouds of differently placed samples bring. Inliers are scene points within three
+        sigma of the model. ``LOW_OVERLAP`` and no pose if no model point is near the scene.
 
     Raises:
         ValueError: if a cloud is too small or a setting out of range; the message names it.

@@ -134,7 +134,8 @@ def icp(
         The pose. ``LOW_OVERLAP`` and no pose if too few points have partners in reach; with a pose,
         if too few are inliers or the residual is no fit's. ``DEGENERATE`` is judged by the
         distances from tangent planes, whatever the kind: along a plane a model can slide. The
-        covariance supposes errors of the points that are independent and as large as the residuals.
+        covariance supposes errors of the points that are independent and as large as the residuals;
+        point to point it is too small, since partners lie beside the points.
 
     Raises:
         ValueError: if a cloud is empty, a setting is out of range, or the clouds lack the colors

@@ -12,6 +12,7 @@ from prehensile.perception.distance_field import DistanceField
 from prehensile.perception.registration.losses import RobustLoss
 from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
 from prehensile.perception.registration.uncertainty import uncertainty_about
+from prehensile.perception.turns import rotation_of
 
 Loss = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 """Losses (N,) of signed distances (N,) [m], and their derivatives (N,)."""
@@ -94,7 +95,7 @@ def estimate_pose_nonlinear(
     p_guess = X_WO_guess.translation() - mean
 
     def pose(x: NDArray[np.float64]) -> RigidTransform:
-        R = _exp(x[:3])
+        R = rotation_of(x[:3])
         return RigidTransform(RotationMatrix(R @ R_guess), mean + length * x[3:] + R @ p_guess)
 
     # A scale beyond the scene's size would make every slope look small.
@@ -175,15 +176,6 @@ def _look_up(
 
 def _named(loss: RobustLoss, scale: float) -> Loss:
     return lambda d: (loss.loss(d, scale), 2 * d * loss.weight(d, scale))
-
-
-def _exp(w: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The rotation by a vector (Rodrigues)."""
-    angle = float(np.linalg.norm(w))
-    K = _skew(w)
-    if angle < 1e-8:
-        return np.eye(3) + K + 0.5 * K @ K
-    return np.eye(3) + np.sin(angle) / angle * K + (1 - np.cos(angle)) / angle**2 * K @ K
 
 
 def _left_jacobian(w: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -75,9 +75,11 @@ def coherent_point_drift(
         history: the pose before every step and the last one are appended to it.
 
     Returns:
-        The pose. Inliers are scene points that belong to the model rather than to nothing. The
-        residual is the root mean square distance from the partners, sigma times the square root
-        of 3. ``LOW_OVERLAP`` and no pose if the Gaussians explain nothing.
+        The pose. Its covariance counts the points as independent, and knows nothing of the bias
+        that clouds of differently placed samples bring. Inliers are scene points that belong to
+        the model rather than to nothing. The residual is the root mean square distance from the
+        partners, sigma times the square root of 3. ``LOW_OVERLAP`` and no pose if the Gaussians
+        explain nothing; with a pose, if they explain little or the residual is no fit's.
 
     Raises:
         ValueError: if a cloud is empty or a setting out of range; the message names it.
