@@ -152,7 +152,7 @@ def icp(
 def icp_many_starts(
     scene: PointCloud,
     model: PointCloud | IcpModel,
-    guesses: Sequence[RigidTransform],
+    X_WO_guesses: Sequence[RigidTransform],
     config: IcpConfig | None = None,
     *,
     num_threads: int = 1,
@@ -167,7 +167,7 @@ def icp_many_starts(
     Args:
         scene: points in W.
         model: points in O.
-        guesses: where to start, at least one.
+        X_WO_guesses: where to start, at least one.
         config: how; the defaults if not given.
         num_threads: of the guesses in parallel, at least 1; it does not change the result.
         ambiguity_ratio: another pose whose mean squared distance is no more than this times the
@@ -181,15 +181,15 @@ def icp_many_starts(
     Raises:
         ValueError: as :func:`icp`, and if there is no guess.
     """
-    if not guesses:
-        raise ValueError("guesses: there is none")
+    if not X_WO_guesses:
+        raise ValueError("X_WO_guesses: there is none")
     if not ambiguity_ratio >= 1:
         raise ValueError(f"ambiguity_ratio: must be at least 1, not {ambiguity_ratio}")
     if distinct_distance is not None and not distinct_distance >= 0:
         raise ValueError(f"distinct_distance: must be at least 0, not {distinct_distance}")
     config = config or IcpConfig()
     prepared = _prepared(model)
-    found = _run(scene, prepared, guesses, config, num_threads, False)
+    found = _run(scene, prepared, X_WO_guesses, config, num_threads, False)
     best = min(found, key=lambda one: one["score"])
     result = _result(best, config, prepared)
     points = prepared.cloud.points
@@ -210,8 +210,8 @@ def icp_many_starts(
         **{
             **vars(result),
             "status": RegistrationStatus.AMBIGUOUS,
-            "message": f"from {len(rivals)} of {len(guesses)} guesses came a different pose that "
-            "explains the scene as well",
+            "message": f"from {len(rivals)} of {len(X_WO_guesses)} guesses came a different pose "
+            "that explains the scene as well",
         }
     )
 
@@ -233,7 +233,7 @@ def _native_cloud(cloud: PointCloud, name: str, *, tree: bool, normals: bool) ->
 def _run(
     scene: PointCloud,
     model: IcpModel,
-    guesses: Sequence[RigidTransform],
+    X_WO_guesses: Sequence[RigidTransform],
     config: IcpConfig,
     num_threads: int,
     keep_history: bool,
@@ -256,7 +256,7 @@ def _run(
     return _core.icp(
         native_scene,
         model.native,
-        np.stack([X.GetAsMatrix4() for X in guesses]),
+        np.stack([X.GetAsMatrix4() for X in X_WO_guesses]),
         kind=config.kind.value,
         direction=config.direction.value,
         max_distance=config.max_distance,
