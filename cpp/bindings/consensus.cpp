@@ -18,19 +18,13 @@ using nb::literals::operator""_a;
 namespace prehensile {
 namespace {
 
-/// (N, 3) finite.
-class PointsArgument : public ArrayArgument {
- public:
-  PointsArgument(nb::handle value, const char* name) : ArrayArgument(value, name) {
-    RequireShape({-1, 3});
-    RequireFinite();
-  }
-  PointRows rows() const { return {data(), static_cast<Eigen::Index>(shape(0)), 3}; }
-};
+PointRows View(const RowsArgument& rows) {
+  return {rows.data(), static_cast<Eigen::Index>(rows.shape(0)), 3};
+}
 
 /// Two arrays of as many rows.
 struct Correspondences {
-  PointsArgument model, scene;
+  RowsArgument model, scene;
   Correspondences(nb::handle model_points, nb::handle scene_points)
       : model(model_points, "model_points"), scene(scene_points, "scene_points") {
     if (model.shape(0) != scene.shape(0)) {
@@ -113,7 +107,7 @@ ConsistencyGraph Graph(nb::handle model_points, nb::handle scene_points, double 
   }
   if (simd && !level) throw std::invalid_argument("simd: this machine lacks '" + *simd + "'");
   return Released([&] {
-    return MakeConsistencyGraph(points.model.rows(), points.scene.rows(), tolerance, scale,
+    return MakeConsistencyGraph(View(points.model), View(points.scene), tolerance, scale,
                                 min_length, level);
   });
 }
@@ -140,15 +134,15 @@ nb::tuple VoteOf(nb::handle values, nb::handle bounds, bool most_inliers) {
 
 nb::tuple ScaleOf(nb::handle model_points, nb::handle scene_points, double noise_bound) {
   const Correspondences points(model_points, scene_points);
-  return AsTuple(Released(
-      [&] { return VoteForScale(points.model.rows(), points.scene.rows(), noise_bound); }));
+  return AsTuple(
+      Released([&] { return VoteForScale(View(points.model), View(points.scene), noise_bound); }));
 }
 
 nb::tuple RotationOf(nb::handle model_vectors, nb::handle scene_vectors, double bound,
                      int max_iterations) {
-  const PointsArgument a(model_vectors, "model_vectors"), b(scene_vectors, "scene_vectors");
+  const RowsArgument a(model_vectors, "model_vectors"), b(scene_vectors, "scene_vectors");
   const RotationConsensus rotation =
-      Released([&] { return GncRotation(a.rows(), b.rows(), bound, max_iterations); });
+      Released([&] { return GncRotation(View(a), View(b), bound, max_iterations); });
   return nb::make_tuple(Matrix(rotation.R), Flags(rotation.inliers), rotation.cost,
                         rotation.iterations, rotation.converged);
 }
@@ -158,7 +152,7 @@ nb::tuple Robust(nb::handle model_points, nb::handle scene_points, double noise_
                  int min_inliers) {
   const Correspondences points(model_points, scene_points);
   const RobustPose pose = Released([&] {
-    return RobustRegistration(points.model.rows(), points.scene.rows(), noise_bound,
+    return RobustRegistration(View(points.model), View(points.scene), noise_bound,
                               {max_nodes, ambiguity_ratio, max_false_alarms, min_inliers});
   });
   return nb::make_tuple(static_cast<int>(pose.status), Pose(pose.R, pose.p), Flags(pose.inliers),
@@ -170,7 +164,7 @@ nb::tuple Ransac(nb::handle model_points, nb::handle scene_points, double max_di
                  std::uint64_t seed, int max_samples, double confidence) {
   const Correspondences points(model_points, scene_points);
   const RansacPose pose = Released([&] {
-    return RansacRegistration(points.model.rows(), points.scene.rows(), max_distance,
+    return RansacRegistration(View(points.model), View(points.scene), max_distance,
                               {seed, max_samples, confidence});
   });
   return nb::make_tuple(Pose(pose.R, pose.p), Flags(pose.inliers), pose.num_inliers, pose.samples,

@@ -27,16 +27,6 @@ using NodeArray = nb::ndarray<const float, nb::shape<-1, 4>, nb::c_contig, nb::d
 using TriangleArray =
     nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
-/// Rows of x, y, z.
-class PointsArgument : public ArrayArgument {
- public:
-  PointsArgument(nb::handle value, const char* name, std::ptrdiff_t n = -1)
-      : ArrayArgument(value, name) {
-    RequireShape({n, 3});
-    RequireFinite();
-  }
-};
-
 void FromNodes(DistanceField* field, const Array3& origin, double spacing, const Sizes& sizes,
                const NodeArray& nodes, bool is_signed) {
   std::vector<FieldNode> copy(nodes.shape(0));
@@ -47,7 +37,7 @@ void FromNodes(DistanceField* field, const Array3& origin, double spacing, const
 
 DistanceField FromMesh(nb::handle vertices, const TriangleArray& triangles, const Array3& origin,
                        double spacing, const Sizes& sizes, bool is_signed, int num_threads) {
-  const PointsArgument v(vertices, "vertices");
+  const RowsArgument v(vertices, "vertices");
   const nb::gil_scoped_release release;
   return MeshDistanceField(v.data(), v.shape(0), triangles.data(), triangles.shape(0),
                            {origin, spacing, sizes}, is_signed, num_threads);
@@ -55,15 +45,15 @@ DistanceField FromMesh(nb::handle vertices, const TriangleArray& triangles, cons
 
 DistanceField FromCloud(nb::handle points, nb::handle normals, double radius, const Array3& origin,
                         double spacing, const Sizes& sizes, int num_threads) {
-  const PointsArgument p(points, "points");
-  const PointsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
+  const RowsArgument p(points, "points");
+  const RowsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
   const nb::gil_scoped_release release;
   return CloudDistanceField(p.data(), n.data(), p.shape(0), radius, {origin, spacing, sizes},
                             num_threads);
 }
 
 nb::tuple At(const DistanceField& field, nb::handle points, int num_threads) {
-  const PointsArgument p(points, "points");
+  const RowsArgument p(points, "points");
   const std::size_t n = p.shape(0);
   ArrayResult<> distances{n}, gradients{n, 3};
   double *const d = distances.data(), *const g = gradients.data();
@@ -75,7 +65,7 @@ nb::tuple At(const DistanceField& field, nb::handle points, int num_threads) {
 }
 
 nb::tuple Closest(const DistanceField& field, nb::handle points) {
-  const PointsArgument p(points, "points");
+  const RowsArgument p(points, "points");
   const std::size_t n = p.shape(0);
   ArrayResult<> at{n, 3}, normals{n, 3};
   double *const to_point = at.data(), *const to_normal = normals.data();
@@ -108,7 +98,7 @@ std::vector<Eigen::Isometry3d> Poses(nb::handle values, const char* name) {
 nb::tuple NearestBody(const std::vector<const DistanceField*>& fields, nb::handle X_WL,
                       nb::handle points, int num_threads) {
   const std::vector<Eigen::Isometry3d> poses = Poses(X_WL, "X_WL");
-  const PointsArgument p(points, "points");
+  const RowsArgument p(points, "points");
   const std::size_t n = p.shape(0);
   ArrayResult<> distances{n}, gradients{n, 3};
   ArrayResult<std::int32_t> bodies{n};
@@ -149,8 +139,8 @@ nb::list Refine(const DistanceField& field, nb::handle points, nb::handle normal
                 double max_distance, double kept_fraction, double min_normal_cosine,
                 std::size_t num_coarse_points, int num_finalists, int max_coarse_iterations,
                 int max_iterations, double tolerance, double inlier_distance, int num_threads) {
-  const PointsArgument p(points, "points");
-  std::optional<PointsArgument> n;
+  const RowsArgument p(points, "points");
+  std::optional<RowsArgument> n;
   if (!normals.is_none()) n.emplace(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
   const std::vector<Eigen::Isometry3d> starts = Poses(X_WO, "X_WO");
   const RefineOptions options{.loss = ParseRobustLoss(loss),

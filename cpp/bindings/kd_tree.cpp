@@ -23,9 +23,7 @@ void RequireDistance(double value, const char* message) {
 
 nb::tuple Nearest(const KdTree& tree, nb::handle queries_argument, int k, double max_distance,
                   int num_threads) {
-  const ArrayArgument queries(queries_argument, "queries");
-  queries.RequireShape({-1, 3});
-  queries.RequireFinite();
+  const RowsArgument queries(queries_argument, "queries");
   RequireDistance(max_distance, "max_distance: must be zero or more");
   if (k < 1) throw std::invalid_argument("k: must be at least 1");
   const std::size_t m = queries.shape(0), columns = static_cast<std::size_t>(k);
@@ -45,9 +43,7 @@ nb::tuple Nearest(const KdTree& tree, nb::handle queries_argument, int k, double
 
 nb::tuple WithinRadius(const KdTree& tree, nb::handle queries_argument, double radius,
                        int num_threads) {
-  const ArrayArgument queries(queries_argument, "queries");
-  queries.RequireShape({-1, 3});
-  queries.RequireFinite();
+  const RowsArgument queries(queries_argument, "queries");
   RequireDistance(radius, "radius: must be zero or more");
   const std::size_t m = queries.shape(0);
   KdTree::Neighbors found;
@@ -70,9 +66,7 @@ struct SharedVoxels {
 };
 
 nb::tuple NearestInVoxels(const SharedVoxels& self, nb::handle queries_argument, int num_threads) {
-  const ArrayArgument queries(queries_argument, "queries");
-  queries.RequireShape({-1, 3});
-  queries.RequireFinite();
+  const RowsArgument queries(queries_argument, "queries");
   const std::size_t m = queries.shape(0);
   ArrayResult<std::int32_t> indices{m};
   ArrayResult<> distances{m};

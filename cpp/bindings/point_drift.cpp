@@ -37,7 +37,11 @@ nb::object SumsAt(const GaussianSums& sums, nb::handle queries, double sigma, do
 nb::object Order(nb::handle points) {
   const ArrayArgument rows(points, "points");
   rows.RequireShape({-1, 3});
-  const std::vector<std::int32_t> order = SpatialOrder(rows.data(), rows.shape(0));
+  std::vector<std::int32_t> order;
+  {
+    const nb::gil_scoped_release release;
+    order = SpatialOrder(rows.data(), rows.shape(0));
+  }
   return ArrayResult<std::int32_t>({order.size()}, order.data()).Take();
 }
 

@@ -9,19 +9,6 @@ using nb::literals::operator""_a;
 namespace prehensile {
 namespace {
 
-/// Rows of x, y, z.
-class RowsArgument : public ArrayArgument {
- public:
-  RowsArgument(nb::handle value, const char* name) : ArrayArgument(value, name) {
-    RequireShape({-1, 3});
-    RequireFinite();
-  }
-  /// @throws std::invalid_argument if there are not so many rows.
-  RowsArgument(nb::handle value, const char* name, std::size_t n) : RowsArgument(value, name) {
-    RequireShape({static_cast<std::ptrdiff_t>(n), 3});
-  }
-};
-
 nb::object ToNumpy(const std::vector<std::int64_t>& values) {
   return ArrayResult<std::int64_t>({values.size()}, values.data()).Take();
 }
@@ -77,7 +64,7 @@ void BindRegions(nb::module_& m) {
       [](nb::handle points, nb::handle normals, double radius, double max_angle,
          double max_distance, std::size_t min_points) {
         const RowsArgument p(points, "points");
-        const RowsArgument n(normals, "normals", p.shape(0));
+        const RowsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
         std::vector<Plane> planes;
         std::vector<std::int64_t> labels;
         {
@@ -97,7 +84,7 @@ void BindRegions(nb::module_& m) {
       [](nb::handle points, nb::handle normals, double voxel_size, double max_concavity,
          double max_step, std::size_t min_points) {
         const RowsArgument p(points, "points");
-        const RowsArgument n(normals, "normals", p.shape(0));
+        const RowsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
         std::vector<std::int64_t> labels;
         {
           const nb::gil_scoped_release release;
@@ -115,7 +102,7 @@ void BindRegions(nb::module_& m) {
       [](nb::handle points, nb::handle normals, nb::handle labels, double voxel_size,
          std::size_t num_labels) {
         const RowsArgument p(points, "points");
-        const RowsArgument n(normals, "normals", p.shape(0));
+        const RowsArgument n(normals, "normals", static_cast<std::ptrdiff_t>(p.shape(0)));
         const ArrayArgument l(labels, "labels");
         l.RequireShape({static_cast<std::ptrdiff_t>(p.shape(0))});
         const std::vector<int> whole = l.Integers();

@@ -14,18 +14,9 @@ using nb::literals::operator""_a;
 namespace prehensile {
 namespace {
 
-/// (M, 3), finite.
-class QueriesArgument : public ArrayArgument {
- public:
-  explicit QueriesArgument(nb::handle value) : ArrayArgument(value, "queries") {
-    RequireShape({-1, 3});
-    RequireFinite();
-  }
-};
-
 nb::tuple Nearest(const MeshSurface& surface, nb::handle queries_argument, double max_distance,
                   int num_threads) {
-  const QueriesArgument queries(queries_argument);
+  const RowsArgument queries(queries_argument, "queries");
   if (!(max_distance >= 0)) {
     throw std::invalid_argument("max_distance: must be zero or more");
   }
@@ -53,7 +44,7 @@ nb::tuple Nearest(const MeshSurface& surface, nb::handle queries_argument, doubl
 
 nb::object SignedDistance(const MeshSurface& surface, nb::handle queries_argument,
                           int num_threads) {
-  const QueriesArgument queries(queries_argument);
+  const RowsArgument queries(queries_argument, "queries");
   ArrayResult<> distances{queries.shape(0)};
   double* const data = distances.data();
   {
@@ -64,7 +55,7 @@ nb::object SignedDistance(const MeshSurface& surface, nb::handle queries_argumen
 }
 
 nb::object WindingNumber(const MeshSurface& surface, nb::handle queries_argument) {
-  const QueriesArgument queries(queries_argument);
+  const RowsArgument queries(queries_argument, "queries");
   ArrayResult<> numbers{queries.shape(0)};
   double* const data = numbers.data();
   {

@@ -108,9 +108,7 @@ nb::object PointsNear(const nb::list& views, const Fields& fields, nb::handle X_
 nb::tuple Terms(nb::handle points_W, const Fields& fields, nb::handle X_WB, const std::string& loss,
                 double loss_scale, const nb::list& views, const nb::list& samples, double margin,
                 double max_violation, int search_radius, double free_space_weight) {
-  const ArrayArgument points(points_W, "points");
-  points.RequireShape({-1, 3});
-  points.RequireFinite();
+  const RowsArgument points(points_W, "points");
   const std::vector<TrackedBody> bodies = Bodies(fields, X_WB, "X_WB");
   const RobustLoss robust_loss = ParseRobustLoss(loss);
   const Views images(views);
@@ -158,9 +156,7 @@ nb::tuple Terms(nb::handle points_W, const Fields& fields, nb::handle X_WB, cons
 }
 
 nb::object Violation(nb::handle points_W, const nb::list& view, double margin) {
-  const ArrayArgument points(points_W, "points_W");
-  points.RequireShape({-1, 3});
-  points.RequireFinite();
+  const RowsArgument points(points_W, "points_W");
   const Views images(view);
   if (images.get().size() != 1) throw std::invalid_argument("view: expected one");
   if (!std::isfinite(margin)) throw std::invalid_argument("margin: must be finite");

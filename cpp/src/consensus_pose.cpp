@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "consensus_detail.h"
+#include "split_mix.h"
 #include "vectors.h"
 
 namespace prehensile {

@@ -6,6 +6,7 @@
 
 #include "cell_grid.h"
 #include "prehensile/regions.h"
+#include "split_mix.h"
 #include "vectors.h"
 
 namespace prehensile {
@@ -42,22 +43,6 @@ struct Moments {
   }
 };
 
-/// Numbers of one seed, the same everywhere (SplitMix64, Steele et al. 2014).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  /// Uniform in [0, n), n < 2³².
-  std::uint32_t Below(std::uint64_t n) {
-    std::uint64_t z = state_ += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return static_cast<std::uint32_t>(((z ^ (z >> 31)) >> 32) * n >> 32);
-  }
-
- private:
-  std::uint64_t state_;
-};
-
 }  // namespace
 
 PlaneResult RansacPlane(const double* points, std::size_t n, const RansacPlaneOptions& options) {
@@ -86,14 +71,17 @@ PlaneResult RansacPlane(const double* points, std::size_t n, const RansacPlaneOp
     }
     return inside;
   };
-  Random random(options.seed);
+  internal::SplitMix random(options.seed);
+  const auto any = [&] {
+    return Eigen::Map<const Vector>(points + std::ptrdiff_t{3} * random.Below(static_cast<int>(n)));
+  };
   std::int64_t best = 0;
   double needed = options.max_iterations;
   while (result.iterations < needed) {
     ++result.iterations;
-    const Eigen::Map<const Vector> p0(points + 3 * random.Below(n));
-    const Eigen::Map<const Vector> p1(points + 3 * random.Below(n));
-    const Eigen::Map<const Vector> p2(points + 3 * random.Below(n));
+    const Vector p0 = any();
+    const Vector p1 = any();
+    const Vector p2 = any();
     const Vector across = (p1 - p0).cross(p2 - p0);
     const double area = across.norm();
     if (!(area > 1e-9 * (p1 - p0).norm() * (p2 - p0).norm())) continue;
