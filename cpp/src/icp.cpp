@@ -43,7 +43,11 @@ class Registration {
     while (result.iterations < options_.max_iterations) {
       keep();
       FindPairs();
-      if (static_cast<int>(pairs_.size()) < MinPairs()) break;
+      if (coarse_ && TooFewPairs()) {
+        coarse_ = false;
+        FindPairs();
+      }
+      if (TooFewPairs()) break;
       Weigh();
       ++result.iterations;
       const auto [way, spread] = Move();
@@ -64,6 +68,7 @@ class Registration {
  private:
   bool Sliding() const { return options_.kind == IcpKind::kPointToPlane; }
   int MinPairs() const { return Sliding() ? 6 : 3; }
+  bool TooFewPairs() const { return static_cast<int>(pairs_.size()) < MinPairs(); }
   Vector3d SceneNormal(std::int32_t i) const { return X_OW_.R * scene_.normals()[i]; }
 
   /// Every how many points one takes part.
@@ -241,7 +246,7 @@ class Registration {
     result->X_WO = Pose(X_WO);
     result->inliers.assign(scene_.size(), 0);
     FindPairs();
-    if (static_cast<int>(pairs_.size()) < MinPairs()) {
+    if (TooFewPairs()) {
       result->outcome = IcpOutcome::kTooFewPairs;
       return;
     }
