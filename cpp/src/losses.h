@@ -8,17 +8,18 @@
 namespace prehensile::internal {
 
 /// The loss of a residual; see RobustLoss.
-[[gnu::always_inline]] static inline double Loss(RobustLoss kind, double r2, double c) {
-  const double c2 = c * c;
+template <typename Scalar>
+[[gnu::always_inline]] static inline Scalar Loss(RobustLoss kind, Scalar r2, Scalar c) {
+  const Scalar c2 = c * c;
   switch (kind) {
     case RobustLoss::kHuber:
-      return r2 <= c2 ? r2 : 2 * c * __builtin_sqrt(r2) - c2;
+      return r2 <= c2 ? r2 : 2 * c * static_cast<Scalar>(__builtin_sqrt(r2)) - c2;
     case RobustLoss::kTukey: {
-      const double t = r2 < c2 ? 1 - r2 / c2 : 0.0;
+      const Scalar t = r2 < c2 ? 1 - r2 / c2 : Scalar{0};
       return c2 / 3 * (1 - t * t * t);
     }
     case RobustLoss::kGemanMcClure:
-      return c2 * r2 / (c2 + r2);
+      return r2 * (c2 / (c2 + r2));
     case RobustLoss::kTruncated:
       return r2 < c2 ? r2 : c2;
     case RobustLoss::kLeastSquares:
@@ -28,25 +29,26 @@ namespace prehensile::internal {
 }
 
 /// The derivative of the loss by r²: the weight of the residual in reweighted least squares.
-[[gnu::always_inline]] static inline double Weight(RobustLoss kind, double r2, double c) {
-  const double c2 = c * c;
+template <typename Scalar>
+[[gnu::always_inline]] static inline Scalar Weight(RobustLoss kind, Scalar r2, Scalar c) {
+  const Scalar c2 = c * c;
   switch (kind) {
     case RobustLoss::kHuber:
-      return r2 <= c2 ? 1.0 : c / __builtin_sqrt(r2);
+      return r2 <= c2 ? Scalar{1} : c / static_cast<Scalar>(__builtin_sqrt(r2));
     case RobustLoss::kTukey: {
-      const double t = r2 < c2 ? 1 - r2 / c2 : 0.0;
+      const Scalar t = r2 < c2 ? 1 - r2 / c2 : Scalar{0};
       return t * t;
     }
     case RobustLoss::kGemanMcClure: {
-      const double t = c2 / (c2 + r2);
+      const Scalar t = c2 / (c2 + r2);
       return t * t;
     }
     case RobustLoss::kTruncated:
-      return r2 <= c2 ? 1.0 : 0.0;
+      return r2 <= c2 ? Scalar{1} : Scalar{0};
     case RobustLoss::kLeastSquares:
       break;
   }
-  return 1.0;
+  return Scalar{1};
 }
 
 // Graduated non-convexity (Yang, Antonante, Tzoumas and Carlone, "Graduated Non-Convexity for

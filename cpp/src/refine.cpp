@@ -319,8 +319,10 @@ class Refiner {
 
 void Validate(const RefineOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
-  Require(positive(options.scale), "scale: must be positive and finite");
-  Require(positive(options.initial_scale), "initial_scale: must be positive and finite");
+  // So that their squares are numbers in single precision.
+  const auto is_scale = [](double x) { return x >= 1e-9 && x <= 1e9; };
+  Require(is_scale(options.scale), "scale: must be positive, from 1e-9 to 1e9");
+  Require(is_scale(options.initial_scale), "initial_scale: must be positive, from 1e-9 to 1e9");
   Require(options.cooling > 0 && options.cooling < 1, "cooling: must be in (0, 1)");
   Require(options.max_distance > 0, "max_distance: must be positive");
   Require(options.kept_fraction > 0 && options.kept_fraction <= 1,

@@ -68,18 +68,19 @@ void LookUpAll(const FieldView<float>& field, const RefinePoints& points, std::s
 template <RobustLoss kLoss>
 RefineCost Weigh(double scale, float max_distance, const float* r, const float* valid,
                  std::size_t n, float* weights) {
-  const double most = static_cast<double>(max_distance) * max_distance;
+  // Single precision for each point, double for the sums.
+  const auto c = static_cast<float>(scale);
+  const float most = max_distance * max_distance;
   double sums[kRefineLanes] = {};
   double counted[kRefineLanes] = {};
   for (std::size_t i = 0; i < n; i += kRefineLanes) {
     for (int lane = 0; lane < kRefineLanes; ++lane) {
-      const double wide = r[i + lane];
-      const double r2 = wide * wide;
-      const double kept = r2 < most ? r2 : most;
-      const double counts = valid[i + lane];
+      const float r2 = r[i + lane] * r[i + lane];
+      const float kept = r2 < most ? r2 : most;
+      const float counts = valid[i + lane];
       counted[lane] += counts;
-      sums[lane] += counts * Loss(kLoss, kept, scale);
-      weights[i + lane] = static_cast<float>(r2 <= most ? counts * Weight(kLoss, r2, scale) : 0.0);
+      sums[lane] += counts * Loss(kLoss, kept, c);
+      weights[i + lane] = r2 <= most ? counts * Weight(kLoss, kept, c) : 0.0F;
     }
   }
   RefineCost cost{};
