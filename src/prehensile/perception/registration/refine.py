@@ -44,7 +44,8 @@ class RefineConfig:
         num_coarse_points: points of the scene that the first iterations look at.
         num_finalists: of all starts, how many go on to all points.
         max_coarse_iterations, max_iterations: on few points, and on all.
-        tolerance: an iteration that moves the points by less ends the refinement [m].
+        tolerance: an iteration that moves the points by less ends the refinement [m]; 4000 points
+            with a noise of 1 mm determine where the object is to some 5e-5.
         inlier_distance: a point no further from the model is an inlier [m]; None for 3 scales.
         min_overlap: least part of the scene that must be inliers.
         ambiguity: poses whose mean loss exceeds the best one's by less than this part of it (or by
@@ -64,7 +65,7 @@ class RefineConfig:
     num_finalists: int = 1
     max_coarse_iterations: int = 40
     max_iterations: int = 30
-    tolerance: float = 1e-5
+    tolerance: float = 3e-5
     inlier_distance: float | None = None
     min_overlap: float = 0.5
     ambiguity: float = 0.1
