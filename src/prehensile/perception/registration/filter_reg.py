@@ -16,7 +16,11 @@ from prehensile.native.kd_tree import KdTree
 from prehensile.perception.cloud import FARTHEST, PointCloud, rotate, within
 from prehensile.perception.registration.known import fit_rigid
 from prehensile.perception.registration.point_drift import bounding_volume
-from prehensile.perception.registration.result import RegistrationResult, RegistrationStatus
+from prehensile.perception.registration.result import (
+    RegistrationResult,
+    RegistrationStatus,
+    residual_limit,
+)
 from prehensile.perception.registration.uncertainty import uncertainty_about
 
 # Gaussians are cut off beyond so many sigma.
@@ -43,6 +47,8 @@ class FilterRegConfig:
         tolerance: done when a step moves the points, root mean square, and changes sigma by less
             [m].
         min_overlap: a smaller part of the scene near the model: ``LOW_OVERLAP``, 0 to 1.
+        max_residual: inliers further from the model than this, root mean square, are no fit:
+            ``LOW_OVERLAP`` [m]; None: a quarter of the model's root mean square radius.
         min_eigenvalue_ratio: a weaker constraint, of the strongest: ``DEGENERATE``.
     """
 
@@ -55,6 +61,7 @@ class FilterRegConfig:
     max_iterations: int = 200
     tolerance: float = 1e-5
     min_overlap: float = 0.3
+    max_residual: float | None = None
     min_eigenvalue_ratio: float = 5e-3
 
 
@@ -144,7 +151,9 @@ def filter_registration(
     )
     model_tree = KdTree(model.points)
     near = rotate(scene.points - X_WO.translation(), X_WO.rotation().matrix().T)
-    inliers = model_tree.nearest(near, max_distance=3 * sigma)[0][:, 0] >= 0
+    indices, distances = model_tree.nearest(near, max_distance=3 * sigma)
+    inliers = indices[:, 0] >= 0
+    off = float(np.sqrt(np.square(distances[inliers]).mean())) if inliers.any() else np.inf
     overlap = float(inliers.mean())
     status, message = RegistrationStatus.SUCCESS, ""
     if overlap < config.min_overlap:
@@ -152,6 +161,9 @@ def filter_registration(
         message = f"only {overlap:.0%} of the scene lie near the model"
     elif len(free):
         status, message = RegistrationStatus.DEGENERATE, "the geometry leaves motions free"
+    elif not off <= residual_limit(model.points, config.max_residual):
+        status = RegistrationStatus.LOW_OVERLAP
+        message = f"the scene lies {off:.3g} m from the model: no fit"
     elif not converged:
         status = RegistrationStatus.NOT_CONVERGED
         message = f"still moving after {iterations} iterations"
@@ -175,7 +187,7 @@ def _check(scene: PointCloud, model: PointCloud, config: FilterRegConfig) -> Non
         raise ValueError("model: the cloud has no points")
     if not 0 <= config.outlier_weight < 1:
         raise ValueError(f"outlier_weight: must be in [0, 1), not {config.outlier_weight}")
-    for name in ("outlier_volume", "sigma", "min_sigma"):
+    for name in ("outlier_volume", "sigma", "min_sigma", "max_residual"):
         value = getattr(config, name)
         if value is not None and not 0 < value <= FARTHEST:
             raise ValueError(f"{name}: must be positive and at most {FARTHEST:g}, not {value}")
