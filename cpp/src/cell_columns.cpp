@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "parallel.h"
+
 namespace prehensile::internal {
 namespace {
 
@@ -33,7 +35,7 @@ void RadixSort(std::vector<Item>* items, int bits) {
 }  // namespace
 
 CellColumns::CellColumns(const double* points, std::size_t n, double cell_size, int cell_reach,
-                         const char* what)
+                         const char* what, int num_threads)
     : size(cell_size), reach(cell_reach) {
   constexpr double kMost = 1 << 20;
   double high[3];
@@ -63,29 +65,36 @@ CellColumns::CellColumns(const double* points, std::size_t n, double cell_size, 
   const int y_shift = bits[2], x_shift = bits[2] + bits[1];
   stride = std::uint64_t{1} << bits[1];
 
+  constexpr std::size_t kRowsPerShare = 8192;
   std::vector<Item> items(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    // The corner has moved; rounding must not move a point beyond the margin that was left for it.
-    const auto cell = [&](int k) {
-      return static_cast<std::uint64_t>(std::max((points[3 * i + k] - low[k]) * inverse,
-                                                 k < 2 ? static_cast<double>(reach) : 0.0));
-    };
-    items[i] = {cell(0) << x_shift | cell(1) << y_shift | cell(2), static_cast<std::int32_t>(i)};
-  }
+  RunShares(n, kRowsPerShare, num_threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      // The corner has moved; rounding must not move a point beyond the margin left for it.
+      const auto cell = [&](int k) {
+        return static_cast<std::uint64_t>(std::max((points[3 * i + k] - low[k]) * inverse,
+                                                   k < 2 ? static_cast<double>(reach) : 0.0));
+      };
+      items[i] = {cell(0) << x_shift | cell(1) << y_shift | cell(2), static_cast<std::int32_t>(i)};
+    }
+  });
   RadixSort(&items, x_shift + bits[0]);
 
   index.resize(n);
   for (std::vector<double>* const coordinates : {&x, &y, &z}) coordinates->resize(n + kPadding);
+  RunShares(n, kRowsPerShare, num_threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const double* const p = points + 3 * static_cast<std::size_t>(items[i].index);
+      index[i] = items[i].index;
+      x[i] = p[0];
+      y[i] = p[1];
+      z[i] = p[2];
+    }
+  });
   const std::uint64_t z_mask = (std::uint64_t{1} << y_shift) - 1;
   // Longer gaps would let the tables of thin columns outgrow the points.
   constexpr std::int32_t kLongestGap = 8;
   for (std::size_t i = 0; i < n; ++i) {
     const Item& item = items[i];
-    const double* const p = points + 3 * static_cast<std::size_t>(item.index);
-    index[i] = item.index;
-    x[i] = p[0];
-    y[i] = p[1];
-    z[i] = p[2];
     if (i > 0 && item.key == items[i - 1].key) continue;
     const std::uint64_t key = item.key >> y_shift;
     const auto cell = static_cast<std::int32_t>(item.key & z_mask);

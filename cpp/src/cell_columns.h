@@ -36,7 +36,8 @@ struct CellColumns {
   /// @param reach how many cells to either side will be looked at.
   /// @param what the argument that sets the size, for messages.
   /// @throws std::invalid_argument naming it, if there are more than 2²⁰ cells in a row.
-  CellColumns(const double* points, std::size_t n, double cell_size, int reach, const char* what);
+  CellColumns(const double* points, std::size_t n, double cell_size, int reach, const char* what,
+              int num_threads);
 };
 
 /// Points [begin, end) of a grid.

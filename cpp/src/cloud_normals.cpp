@@ -95,7 +95,7 @@ void NormalsWithinRadius(const double* points, std::size_t n, double radius, int
   // Cells of half the radius: half of the points in the 5³ around a cell are neighbours of one in
   // it, if they lie on a surface. Larger cells hold more that are not, smaller ones are too many.
   constexpr int kReach = 2;
-  const CellColumns grid(points, n, radius / kReach, kReach, "radius");
+  const CellColumns grid(points, n, radius / kReach, kReach, "radius", num_threads);
   const NormalsKernel& kernel = Kernel();
   internal::RunShares(
       grid.columns.size(), 256, num_threads, [&](std::size_t first, std::size_t last) {
