@@ -11,10 +11,11 @@ void InsideBox(const Scalar* points, std::size_t n, const double* X_BW, const do
   const double* const X = X_BW;
   for (std::size_t i = 0; i < n; ++i) {
     const double x = points[3 * i], y = points[3 * i + 1], z = points[3 * i + 2];
-    // A comparison with NaN is false.
-    mask[i] = static_cast<std::uint8_t>((std::abs(X[0] * x + X[1] * y + X[2] * z + X[3]) <= hx) &
-                                        (std::abs(X[4] * x + X[5] * y + X[6] * z + X[7]) <= hy) &
-                                        (std::abs(X[8] * x + X[9] * y + X[10] * z + X[11]) <= hz));
+    // A comparison with NaN is false. Integers, so that nothing branches.
+    const int in_x = std::abs(X[0] * x + X[1] * y + X[2] * z + X[3]) <= hx;
+    const int in_y = std::abs(X[4] * x + X[5] * y + X[6] * z + X[7]) <= hy;
+    const int in_z = std::abs(X[8] * x + X[9] * y + X[10] * z + X[11]) <= hz;
+    mask[i] = static_cast<std::uint8_t>(in_x & in_y & in_z);
   }
 }
 

@@ -221,7 +221,7 @@ class Fusion {
         num_shares == 1 ? num_rows : num_rows / (4 * std::size_t(num_shares)), 32, 1 << 15));
     std::vector<Strip> strips;
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      const auto [columns, rows] = regions[i];
+      const Range columns = regions[i].first, rows = regions[i].second;
       if (columns.empty() || rows.empty()) continue;
       const int parts = std::max((rows.end - rows.begin) / std::max(strip_rows, 1), 1);
       for (int part = 0; part < parts; ++part) {
