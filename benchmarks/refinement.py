@@ -60,9 +60,9 @@ def _outward(points: Any, normals: Any) -> Any:
     """Normals turned alike across neighbours, out of the whole."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    _, near = cKDTree(points).query(points, 12)
+    _, near = KDTree(points).query(points, 12)
     rows, columns = np.repeat(np.arange(len(points)), 12), near.ravel()
     cost = 1.0001 - np.abs((normals[rows] * normals[columns]).sum(axis=1))
     tree = minimum_spanning_tree(csr_matrix((cost, (rows, columns)), shape=(len(points),) * 2))
@@ -136,7 +136,7 @@ def _measure(
             for trial in range(TRIALS):
                 with np.load(folder / f"{name}-{angle}-{trial}.npz") as file:
                     scene, X_WO, guess = file["scene"], file["X_WO"], file["guess"]
-                times = []
+                times, found = [], guess
                 for _ in range(repeats):
                     start = time.perf_counter()
                     found = solve(model, scene, guess)

@@ -71,7 +71,8 @@ def test_half_spaces_that_hold_change_nothing():
         assert answer.X_WO is not None
         assert answer.X_WO.IsNearlyEqualTo(free.X_WO, 1e-4)
     answer = fit_rigid_constrained(model, scene, HalfSpaces([[0, 0, 1.0]], [-1.0]))
-    assert answer.covariance is not None and free.covariance is not None
+    assert answer.covariance is not None
+    assert free.covariance is not None
     # Gauss-Newton here, the exact second derivative there.
     np.testing.assert_allclose(answer.covariance, free.covariance, rtol=0.03, atol=1e-6)
 

@@ -1,9 +1,10 @@
+#include "prehensile/features.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "bindings.h"
 #include "numpy_arrays.h"
-#include "prehensile/features.h"
 
 namespace nb = nanobind;
 using nb::literals::operator""_a;

@@ -616,8 +616,8 @@ def refine_poses(
     their number and root mean square distance."""
 
 # Depth images (prehensile/depth_fusion.h). A view is (depth (H, W) float32 or uint16, its unit [m],
-# (fx, fy, cx, cy), rays (2, H, W) float32 or None, X_WC, colors (H, W, 3) uint8 or None); limits are
-# those of prehensile.perception.depth.DepthConfig.limits().
+# (fx, fy, cx, cy), rays (2, H, W) float32 or None, X_WC, colors (H, W, 3) uint8 or None); limits
+# are those of prehensile.perception.depth.DepthConfig.limits().
 def fuse_depth(
     views: list[tuple[NDArray, float, ArrayLike, NDArray | None, ArrayLike, NDArray | None]],
     X_WB: ArrayLike,
