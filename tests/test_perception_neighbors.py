@@ -1,5 +1,7 @@
 """Nearest neighbours among points and on meshes, beside SciPy, closed forms and full searches."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -325,3 +327,20 @@ def test_voxel_hash_names_bad_arguments():
     assert voxels.nearest([[1e150, 0, 0]])[0].tolist() == [-1]
     with pytest.raises(ValueError, match="queries"):
         voxels.nearest([[0, 0, np.inf]])
+
+
+def test_voxels_may_grow_while_threads_query() -> None:
+    """Every answer is that for some of the points: those inserted so far."""
+    points = np.random.default_rng(5).uniform(0, 1, (20_000, 3))
+    queries = points[:2000]
+    voxels = VoxelHash(0.05)
+    voxels.insert(queries)
+    with ThreadPoolExecutor(2) as pool:
+        answers = [pool.submit(voxels.nearest, queries) for _ in range(20)]
+        for part in np.split(points[2000:], 90):
+            voxels.insert(part)
+        for answer in answers:
+            indices, distances = answer.result()
+            assert (indices == np.arange(2000)).all()
+            assert not distances.any()
+    assert len(voxels) == len(points)

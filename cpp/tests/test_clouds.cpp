@@ -419,8 +419,7 @@ void TestFusion() {
       }
     }
   }
-  // From so far off that single precision puts points of the box outside of the
-  // grid.
+  // From so far off that single precision cannot tell voxels from each other.
   DepthImageView far = scene.view;
   far.scale = 2e5;
   for (const double height : {1e5, 1e5 + 0.003}) {

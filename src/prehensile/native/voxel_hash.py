@@ -28,7 +28,7 @@ class VoxelHash:
     def insert(self, points: ArrayLike) -> None:
         """Adds points, whose indices follow those of the points that are there.
 
-        Must not be called while another thread queries.
+        Waits for other threads' queries under way, and they for it.
 
         Args:
             points: (N, 3) finite, less than 2²⁰ voxels from the origin of their frame.
