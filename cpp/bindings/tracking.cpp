@@ -33,7 +33,10 @@ class Views {
     for (const nb::handle item : list) {
       const nb::tuple parts = nb::cast<nb::tuple>(item);
       if (parts.size() != 4) throw std::invalid_argument("views: expected 4 values each");
-      const Image depth = nb::cast<Image>(parts[0]);
+      Image depth;
+      if (!nb::try_cast(parts[0], depth)) {
+        throw std::invalid_argument("depth: expected (H, W) float32");
+      }
       const ArrayArgument K(parts[1], "K");
       K.RequireShape({3, 3});
       K.RequireFinite();
@@ -50,7 +53,10 @@ class Views {
                      .R_WC = X_WC.topLeftCorner<3, 3>(),
                      .p_WC = X_WC.topRightCorner<3, 1>()};
       if (!parts[3].is_none()) {
-        const Mask ignored = nb::cast<Mask>(parts[3]);
+        Mask ignored;
+        if (!nb::try_cast(parts[3], ignored)) {
+          throw std::invalid_argument("ignored: expected (H, W) uint8");
+        }
         if (ignored.shape(0) != depth.shape(0) || ignored.shape(1) != depth.shape(1)) {
           throw std::invalid_argument("ignored: must have the shape of depth");
         }
