@@ -39,7 +39,7 @@ class FinderConfig:
     # What the cameras' depth is like.
     depth: DepthConfig = field(
         default_factory=lambda: DepthConfig(
-            min_depth=0.3, max_depth=1.5, window=9, noise_quadratic=0.0025
+            min_depth=0.3, max_depth=1.5, window=11, noise_quadratic=0.0025
         )
     )
     # How the object is looked for. Flying pixels and ragged edges seem to see through its rim, and
