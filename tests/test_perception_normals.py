@@ -66,6 +66,28 @@ def test_normals_of_nearest_are_eigenvectors(neighbors):
     )
 
 
+@pytest.mark.parametrize("offset", [0.0, 100.0])
+def test_normals_of_voxels_are_eigenvectors_of_the_voxels_around(offset):
+    points = wavy_points(4000) + [offset, -offset, 0]
+    voxel = 0.008
+    cell = np.floor(points / voxel).astype(int)
+    around = cKDTree(cell).query_ball_point(cell, 1, p=np.inf)
+    values, vectors = principal_directions(points, around)
+    cloud = estimate_normals(PointCloud(points), voxel_size=voxel)
+    clear = values[:, 1] - values[:, 0] > 0.02 * values[:, 2]
+    assert clear.mean() > 0.97
+    assert degrees_between_lines(cloud.normals, vectors)[clear].max() < 0.01
+    np.testing.assert_allclose(
+        surface_variation(PointCloud(points), voxel_size=voxel, num_threads=3),
+        values[:, 0] / values.sum(axis=1),
+        atol=2e-6,
+    )
+    with pytest.raises(ValueError, match="voxel_size"):
+        estimate_normals(PointCloud(points), voxel_size=0.0)
+    with pytest.raises(ValueError, match="voxel_size"):
+        estimate_normals(PointCloud(points + 1e9), voxel_size=voxel)
+
+
 def test_a_sphere_seen_from_several_sides():
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(20000, 3))

@@ -47,6 +47,15 @@ void BindCloudNormals(nb::module_& m) {
                          });
       },
       "points"_a, "neighbors"_a, "num_threads"_a);
+  m.def(
+      "normals_of_voxels",
+      [](nb::handle points, double voxel_size, int num_threads) {
+        return Estimated(points,
+                         [&](const double* p, std::size_t n, double* normals, double* variation) {
+                           NormalsOfVoxels(p, n, voxel_size, num_threads, normals, variation);
+                         });
+      },
+      "points"_a, "voxel_size"_a, "num_threads"_a);
 }
 
 }  // namespace prehensile

@@ -70,6 +70,12 @@ class CellGrid {
   const std::uint32_t* begin(std::size_t c) const { return order_.data() + begin_[c]; }
   const std::uint32_t* end(std::size_t c) const { return order_.data() + begin_[c + 1]; }
 
+  /// Number of cell c along axis k: its points lie in [Index, Index + 1) cells.
+  std::int64_t Index(std::size_t c, int k) const {
+    return static_cast<std::int64_t>(cells_[c] >> (42 - 21 * k) & ((std::uint64_t{1} << 21) - 1)) -
+           kMaxIndex;
+  }
+
   /// The cell that lies so many cells from cell c, or -1 if no point is in it. |d| ≤ 2.
   std::int64_t Neighbor(std::size_t c, int dx, int dy, int dz) const {
     // No carry between the three numbers: points keep two cells away from the limits.

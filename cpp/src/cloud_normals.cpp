@@ -1,6 +1,7 @@
 #include "prehensile/cloud_normals.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "cell_columns.h"
+#include "cell_grid.h"
 #include "cloud_normals_kernel.h"
 #include "parallel.h"
 #include "prehensile/kd_tree.h"
@@ -19,6 +21,7 @@ namespace prehensile {
 namespace {
 
 using internal::CellColumns;
+using internal::CellGrid;
 using internal::CellRun;
 using internal::CovarianceBlock;
 using internal::kCandidateLanes;
@@ -166,6 +169,63 @@ void NormalsOfNearest(const double* points, std::size_t n, int k, int num_thread
     }
     solver.Finish();
   });
+}
+
+void NormalsOfVoxels(const double* points, std::size_t n, double voxel_size, int num_threads,
+                     double* normals, double* variation) {
+  RequireFinite(points, n);
+  const CellGrid grid(points, n, voxel_size, "voxel_size");
+  const std::size_t cells = grid.num_cells();
+  using Sums = std::array<double, 10>;
+  // Of each cell, from its centre, in cells.
+  std::vector<Sums> own(cells);
+  internal::RunShares(cells, 512, num_threads, [&](std::size_t first, std::size_t last) {
+    for (std::size_t c = first; c < last; ++c) {
+      Sums& sums = own[c];
+      sums.fill(0);
+      for (const std::uint32_t* i = grid.begin(c); i != grid.end(c); ++i) {
+        double p[3];
+        for (int k = 0; k < 3; ++k) {
+          p[k] = points[3 * static_cast<std::size_t>(*i) + k] / voxel_size -
+                 (static_cast<double>(grid.Index(c, k)) + 0.5);
+        }
+        const double terms[10] = {1,           p[0],        p[1],        p[2],        p[0] * p[0],
+                                  p[0] * p[1], p[0] * p[2], p[1] * p[1], p[1] * p[2], p[2] * p[2]};
+        for (int k = 0; k < 10; ++k) sums[k] += terms[k];
+      }
+    }
+  });
+  std::vector<double> cell_normals(3 * cells), cell_variation(cells);
+  internal::RunShares(cells, 512, num_threads, [&](std::size_t first, std::size_t last) {
+    Solver solver(cell_normals.data(), cell_variation.data());
+    for (std::size_t c = first; c < last; ++c) {
+      Sums total{};
+      for (int d = 0; d < 27; ++d) {
+        const int o[3] = {d / 9 - 1, d / 3 % 3 - 1, d % 3 - 1};
+        const std::int64_t at =
+            d == 13 ? static_cast<std::int64_t>(c) : grid.Neighbor(c, o[0], o[1], o[2]);
+        if (at < 0) continue;
+        const Sums& s = own[at];
+        // Moved to this cell's centre.
+        total[0] += s[0];
+        for (int k = 0; k < 3; ++k) total[1 + k] += s[1 + k] + s[0] * o[k];
+        int m = 4;
+        for (int j = 0; j < 3; ++j) {
+          for (int k = j; k < 3; ++k, ++m) {
+            total[m] += s[m] + o[j] * s[1 + k] + o[k] * s[1 + j] + s[0] * o[j] * o[k];
+          }
+        }
+      }
+      solver.Add(c, total.data());
+    }
+    solver.Finish();
+  });
+  for (std::size_t c = 0; c < cells; ++c) {
+    for (const std::uint32_t* i = grid.begin(c); i != grid.end(c); ++i) {
+      std::copy_n(&cell_normals[3 * c], 3, normals + 3 * static_cast<std::size_t>(*i));
+      if (variation) variation[*i] = cell_variation[c];
+    }
+  }
 }
 
 }  // namespace prehensile

@@ -29,4 +29,13 @@ void NormalsWithinRadius(const double* points, std::size_t n, double radius, int
 void NormalsOfNearest(const double* points, std::size_t n, int k, int num_threads, double* normals,
                       double* variation);
 
+/// Neighbours: the points of the voxel that a point is in and of the 26 around, by moments that are
+/// summed once per voxel; all points of a voxel get the same answer. Voxels are the cells of the
+/// grid through the origin.
+///
+/// @throws std::invalid_argument if a coordinate is not finite, n ≥ 2³¹, voxel_size is not positive
+///     and finite, or a point lies more than 2²⁰ voxels from the origin.
+void NormalsOfVoxels(const double* points, std::size_t n, double voxel_size, int num_threads,
+                     double* normals, double* variation);
+
 }  // namespace prehensile

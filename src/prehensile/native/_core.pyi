@@ -651,6 +651,11 @@ def normals_of_nearest(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normals (N, 3) and surface variations (N,)."""
 
+def normals_of_voxels(
+    points: ArrayLike, voxel_size: float, num_threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Normals (N, 3) and surface variations (N,)."""
+
 # Consensus among correspondences (prehensile/consensus.h).
 class ConsistencyGraph:
     """An undirected graph without loops, its adjacency matrix one bit per pair."""

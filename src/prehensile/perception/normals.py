@@ -15,11 +15,15 @@ def estimate_normals(
     *,
     radius: float | None = None,
     neighbors: int | None = None,
+    voxel_size: float | None = None,
     num_threads: int = 1,
 ) -> PointCloud:
     """The cloud with the normal at each point: along the least variance among its neighbours.
 
-    The neighbours are all points within a radius, or the nearest so many; the point itself is one.
+    The neighbours are all points within a radius, or the nearest so many, or those in the point's
+    voxel and the 26 around it; the point itself is one. With voxels, moments are summed once for
+    each, so the time does not grow with the number of neighbours; all points of a voxel get one
+    answer, and an edge is rounded over a voxel more.
     Normals look towards the point's own sensor where the cloud has sensor_origins, and upward
     (n_z ≥ 0) where it has none.
 
@@ -33,15 +37,17 @@ def estimate_normals(
     Args:
         cloud: in any one frame; may be empty.
         radius: of the neighbourhood [m], such as five times the distance between points. Give
-            this or `neighbors`.
+            this, `neighbors` or `voxel_size`.
         neighbors: how many, at least 3.
+        voxel_size: edge of the voxels of the grid through the origin [m].
         num_threads: does not change the result.
 
     Raises:
-        ValueError: not exactly one of radius and neighbors, a value out of range, or a radius so
-            small that the cloud spans more than 2¹⁹ of them.
+        ValueError: not exactly one of radius, neighbors and voxel_size, a value out of range, a
+            radius so small that the cloud spans more than 2¹⁹ of them, or a voxel so small that a
+            point lies more than 2²⁰ of them from the origin.
     """
-    normals, _ = _estimate(cloud, radius, neighbors, num_threads)
+    normals, _ = _estimate(cloud, radius, neighbors, voxel_size, num_threads)
     estimated = cloud.replace(normals=normals)
     return estimated if cloud.sensor_origins is None else orient_normals(estimated)
 
@@ -51,6 +57,7 @@ def surface_variation(
     *,
     radius: float | None = None,
     neighbors: int | None = None,
+    voxel_size: float | None = None,
     num_threads: int = 1,
 ) -> NDArray[np.float64]:
     """How far the surface bends or how noisy it is around each point: (N,), 0 to 1/3.
@@ -61,12 +68,12 @@ def surface_variation(
     R²) for a neighbourhood of radius r. 0 where fewer than three points are neighbours.
 
     Args:
-        cloud, radius, neighbors, num_threads: as in :func:`estimate_normals`.
+        cloud, radius, neighbors, voxel_size, num_threads: as in :func:`estimate_normals`.
 
     Raises:
         ValueError: as in :func:`estimate_normals`.
     """
-    return _estimate(cloud, radius, neighbors, num_threads)[1]
+    return _estimate(cloud, radius, neighbors, voxel_size, num_threads)[1]
 
 
 def orient_normals(
@@ -97,11 +104,17 @@ def orient_normals(
 
 
 def _estimate(
-    cloud: PointCloud, radius: float | None, neighbors: int | None, num_threads: int
+    cloud: PointCloud,
+    radius: float | None,
+    neighbors: int | None,
+    voxel_size: float | None,
+    num_threads: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Normals (N, 3) with n_z ≥ 0 and surface variations (N,)."""
-    if (radius is None) == (neighbors is None):
-        raise ValueError("radius, neighbors: give one of the two")
+    if sum(value is not None for value in (radius, neighbors, voxel_size)) != 1:
+        raise ValueError("radius, neighbors, voxel_size: give one of the three")
     if radius is not None:
         return _core.normals_within_radius(cloud.points, radius, num_threads)
+    if voxel_size is not None:
+        return _core.normals_of_voxels(cloud.points, voxel_size, num_threads)
     return _core.normals_of_nearest(cloud.points, neighbors, num_threads)
