@@ -150,8 +150,10 @@ def test_arguments_and_exit_status_go_through(command):
 def test_interrupt_gives_130():
     """Ctrl-C while a command runs, as a shell would send it."""
     code = (
-        "import sys, time, types\n"
+        "import signal, sys, time, types\n"
         "from prehensile.cli import main as cli\n"
+        # A shell's background job, as the tests may be, ignores interrupts and hands that on.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "probe = types.ModuleType('prehensile.cli.probe')\n"
         "probe.add_arguments = lambda parser: None\n"
         "def run(args):\n    print('ready', flush=True)\n    time.sleep(30)\n"

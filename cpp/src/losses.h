@@ -15,8 +15,9 @@ template <typename Scalar>
     case RobustLoss::kHuber:
       return r2 <= c2 ? r2 : 2 * c * static_cast<Scalar>(__builtin_sqrt(r2)) - c2;
     case RobustLoss::kTukey: {
-      const Scalar t = r2 < c2 ? 1 - r2 / c2 : Scalar{0};
-      return c2 / 3 * (1 - t * t * t);
+      // c² / 3 (1 - (1 - x)³) without the cancellation.
+      const Scalar x = r2 < c2 ? r2 / c2 : Scalar{1};
+      return c2 / 3 * (x * (3 - x * (3 - x)));
     }
     case RobustLoss::kGemanMcClure:
       return r2 * (c2 / (c2 + r2));

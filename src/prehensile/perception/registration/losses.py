@@ -43,7 +43,8 @@ class RobustLoss(Enum):
         if self is RobustLoss.HUBER:
             return np.where(r2 <= c2, r2, 2 * scale * np.sqrt(r2) - c2)
         if self is RobustLoss.TUKEY:
-            return c2 / 3 * (1 - (1 - np.minimum(r2 / c2, 1)) ** 3)
+            x = np.minimum(r2 / c2, 1)
+            return c2 / 3 * (x * (3 - x * (3 - x)))  # 1 - (1 - x)^3, without the cancellation
         if self is RobustLoss.GEMAN_MCCLURE:
             return c2 * r2 / (c2 + r2)
         if self is RobustLoss.TRUNCATED:
